@@ -1,6 +1,6 @@
 """How often are mistakes in logs and batch files identified, and how many are false positives? (`make input-checks`)
 
-Thirty-one mistakes are made in copies of batches, each with sizes, recordings and channels drawn from a seed, and the
+Thirty-three mistakes are made in copies of batches, each with sizes, recordings and channels drawn from a seed, and the
 copies are read as `ccmodel check` reads them. The batches are a measured one, a simulated one and concealed cases of
 the proof with fresh seeds. The same batches without a mistake count the false alarms. Writes a section of
 docs/input-checks.md.
@@ -273,6 +273,15 @@ def _held(copy: Copy, random) -> str:
     return columns[0]
 
 
+def _torque_in_a_smaller_unit(copy: Copy, random) -> str:
+    copy.columns("load_cell_V")  # a torque has no second source but the sum of tensions
+    end, by = str(random.choice(["drive", "load"])), float(random.choice([100.0, 1000.0]))  # N cm, mN m
+    for column in copy.columns(f"^{end}_(current_A|torque_counts)"):
+        for table in copy.logs.values():
+            table[column] *= by
+    return TORQUE_AT[end]
+
+
 def _fine_accuracy(copy: Copy, random) -> str:
     stated = copy.rig["accuracy"]
     key = random.choice([key for key in ("torque_Nm", "load_cell_N") if key in stated])
@@ -374,6 +383,7 @@ MISTAKES: Mapping[str, Callable[[Copy, np.random.Generator], str]] = {
     "starts of recordings too near": _near_starts,
     "a pair called a single cable": _single_cable,
     "the pretension of one recording": _pretension_of_one,
+    "a torque in mN m or N cm": _torque_in_a_smaller_unit,
 }
 
 

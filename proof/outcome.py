@@ -87,7 +87,7 @@ class Outcome:
     @property
     def verdict(self) -> str:
         """The verdict; "none" if there is no diagnosis."""
-        return self.diagnosis["verdict"] if self.diagnosis else "none"
+        return verdict_of(self.diagnosis)
 
     @property
     def identified(self) -> list[dict]:
@@ -215,6 +215,11 @@ class Outcome:
         is_sure = self.verdict == "explained" and all(c["confidence"] >= DECISION_THRESHOLD for c in reported)
         is_incomplete = is_sure and len(self.true_names) > 1 and not self.true_names <= self.true_among(reported)
         return len(reported) > MOST_MECHANISMS or wrong or is_incomplete
+
+
+def verdict_of(diagnosis: Mapping | None) -> str:
+    """Verdict of a diagnosis; "none" without one."""
+    return diagnosis["verdict"] if diagnosis else "none"
 
 
 def after(o: Outcome, which: str) -> Outcome:

@@ -9,7 +9,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from proof.outcome import DECISION_THRESHOLD, refusal, same_place
+from proof.outcome import DECISION_THRESHOLD, refusal, same_place, verdict_of
 from proof.real.cases import RealCase, cases_of, label, name_of, place_of
 from proof.real.plan import RealPlan
 from proof.real.run import BASELINE
@@ -66,7 +66,7 @@ class RealOutcome:
     @property
     def verdict(self) -> str:
         """The verdict; "none" if there is no diagnosis."""
-        return self.diagnosis["verdict"] if self.diagnosis else "none"
+        return verdict_of(self.diagnosis)
 
     @property
     def claims(self) -> list[dict]:

@@ -14,9 +14,11 @@ LIMITS = Limits(coverage=0.99, reproducibility=0.01)
 REPEATED = ("c1-a", "c1-b", "c2-a", "c2-b")
 
 
-def batch(errors, names=REPEATED, digest="same", verdict=None, fit_sd=0.0, rig="rig", window=(6.0, 8.0, 1000.0)):
-    """A batch with one parameter set and one channel of these errors, without bias."""
-    channel = ChannelAccuracy(biases=[0.0] * len(errors), errors=list(errors), fit_sd=fit_sd)
+def batch(
+    errors, names=REPEATED, digest="same", verdict=None, fit_sd=0.0, rig="rig", window=(6.0, 8.0, 1000.0), biases=None
+):
+    """A batch with one parameter set and one channel of these errors, without bias unless it is given."""
+    channel = ChannelAccuracy(biases=biases or [0.0] * len(errors), errors=list(errors), fit_sd=fit_sd)
     return BatchAccuracy(
         rig=rig,
         origin="virtual-rig",
@@ -65,6 +67,50 @@ def test_recorded_again_the_scatter_of_repeats_decides():
         assert outcome(before, batch([factor * e for e in (5.0, 5.5, 5.0, 5.5)], digest="other")) == expected
 
 
+def upper(error, quantile, variance):
+    """Upper end of the interval of an error that is recorded again."""
+    return error * np.exp(quantile * np.sqrt(variance) + np.log(1.01))
+
+
+def test_the_accepted_and_the_present_recordings_have_weights_and_fits_of_their_own():
+    before = batch([5.0, 5.5, 5.0, 5.5])
+    (change,) = compare({"b": before}, {"b": batch([6.0, 6.0], digest="other", fit_sd=0.05)}, LIMITS).changes
+    # Squares of 25 and 30.25 twice each, and two equal ones.
+    weights = 2 * (25.0**2 + 30.25**2) / 110.5**2 + 2 * 0.5**2
+    variance = np.log(1.1) ** 2 / 2 * weights + 0.05**2
+    assert change.high == pytest.approx(upper(np.sqrt(27.625), t.isf(0.01, 2), variance))
+
+
+def test_the_scatter_of_repeats_is_that_of_all_batches_of_the_rig_unless_the_batch_has_more():
+    """One difference between repeats in each batch: of ln 1.02 and ln 1.3 on one rig, and of ln 3 on another."""
+    names = ("c-a", "c-b")
+
+    def run(digest):
+        factors = {"quiet": 1.02, "loud": 1.3, "elsewhere": 3.0}
+        rigs = {"elsewhere": "other rig"}
+        return {b: batch([1.0, f], names, digest, rig=rigs.get(b, "rig")) for b, f in factors.items()}
+
+    high = {change.batch: change.high for change in compare(run("x"), run("y"), LIMITS).changes}
+    quantile, pooled = t.isf(0.01 / 3, 2), (np.log(1.02) ** 2 + np.log(1.3) ** 2) / 4
+    for name, factor, square in (("quiet", 1.02, pooled), ("loud", 1.3, np.log(1.3) ** 2 / 2)):
+        weights = 2 * (1 + factor**4) / (1 + factor**2) ** 2
+        assert high[name] == pytest.approx(upper(np.sqrt((1 + factor**2) / 2), quantile, square * weights)), name
+
+
+def test_on_the_same_batch_the_recordings_that_both_have_are_compared():
+    before = batch([5.0, 7.0, 1.0, 20.0])
+    now = batch([7.0, 5.0, 1.0], names=("c1-b", "c1-a", "c2-a"))
+    (change,) = compare({"b": before}, {"b": now}, LIMITS).changes
+    assert (change.accepted, change.now, change.outcome) == (pytest.approx(5.0), pytest.approx(5.0), KEPT)
+
+
+def test_the_largest_loss_stands_first():
+    before = {b: batch([5.0] * 4) for b in "abc"}
+    found = compare(before, {b: batch([e] * 4) for b, e in (("a", 6.0), ("b", 9.0), ("c", 7.0))}, LIMITS)
+    assert [change.batch for change in found.of(LOST)] == ["b", "c", "a"]
+    assert [line[:7] for line in found.losses] == ["batch b", "batch c", "batch a"]
+
+
 def test_other_noise_is_covered_as_stated():
     """Errors drawn anew a thousand times raise about one false alarm in a hundred runs of ten channels' batches."""
     random, alarms, runs = np.random.default_rng(3), 0, 400
@@ -86,6 +132,13 @@ def test_a_fit_of_other_recordings_makes_a_batch_one_that_was_recorded_again():
 
     assert all(c.same_recordings for c in compare(run("x"), run("x"), LIMITS).changes)
     assert not any(c.same_recordings for c in compare(run("x"), run("y"), LIMITS).changes)
+    for one, other in ((True, False), (False, True)):
+        before, now = run("x"), run("y")
+        for of, is_fitted in ((before, one), (now, other)):
+            if not is_fitted:
+                of["b"].sets["fitted"].fitted_to.clear()
+        same = {c.batch: c.same_recordings for c in compare(before, now, LIMITS).changes}
+        assert same == {"b": False, "half-loop": False}, "a fit of either run is enough"
 
 
 def test_without_repeats_the_scatter_of_all_recordings_takes_their_place():
@@ -103,11 +156,25 @@ def test_one_recording_made_again_cannot_be_judged_and_is_named():
     assert compare({"b": batch([5.0])}, {"b": batch([9.0])}, LIMITS).losses, "on the same recording it is judged"
 
 
+def test_an_interval_of_more_than_ten_in_ln_error_is_none():
+    """One pair of repeats has one degree of freedom, for which the quantile of 0.99 is 31.8."""
+    for factor, expected in ((1.5, KEPT), (1.7, UNKNOWN)):
+        errors = [1.0, factor]
+        weights = 2 * (1 + factor**4) / (1 + factor**2) ** 2
+        reach = 31.82 * np.log(factor) / np.sqrt(2) * np.sqrt(weights)
+        assert (reach > 10) == (expected == UNKNOWN)
+        assert outcome(batch(errors), batch(errors, digest="other")) == expected
+
+
 def test_less_data_is_a_loss_and_is_named():
     before = batch([5.0] * 4)
     earlier = batch([5.0] * 4, window=(4.0, 6.0, 1000.0))
     assert "compared from 4 to 6 s, accepted from 6 to 8 s" in compare({"b": before}, {"b": earlier}, LIMITS).losses[0]
     assert not compare({"b": before}, {"b": batch([5.0] * 4, window=(6.01, 8.01, 1001.0))}, LIMITS).losses
+    later = batch([5.0] * 4, window=(6.3, 8.0, 1000.0))
+    assert "compared from 6.3 to 8 s, accepted from 6 to 8 s" in compare({"b": before}, {"b": later}, LIMITS).losses[0]
+    sparse = batch([5.0] * 4, window=(6.0, 8.0, 850.0))
+    assert "compared in 850 samples, accepted in 1000" in compare({"b": before}, {"b": sparse}, LIMITS).losses[0]
     fewer = compare({"b": before}, {"b": batch([5.0] * 3)}, LIMITS).losses
     assert fewer == ["batch b, recording c2-b: compared before, and not in this run"]
     gone = compare({"b": before, "c": before}, {"b": before}, LIMITS).losses
@@ -148,6 +215,12 @@ def test_a_verdict_that_determines_less_is_a_loss_on_the_same_recordings_only():
     assert not run("unexplained", "explained: kink at conduit").losses
     assert run("unexplained", "explained: kink at conduit").verdicts
     assert not run("agrees", "unexplained", digest="other").losses
+    least_first = [("not diagnosed", "inputs-inconsistent"), ("unexplained",), ("undecided",)]
+    least_first.append(("learned: load torque", "explained: kink at conduit", "agrees"))
+    every = [(name, rank) for rank, names in enumerate(least_first) for name in names]
+    for before, high in every:
+        for after, low in every:
+            assert bool(run(before, after).losses) == (low < high), (before, after)
 
 
 def test_a_written_baseline_is_read_again_and_states_its_intervals(tmp_path):
@@ -159,6 +232,23 @@ def test_a_written_baseline_is_read_again_and_states_its_intervals(tmp_path):
     assert low < value < high
     assert outcome(batches["b"], batch([0.99 * high] * 4, digest="other")) == KEPT
     assert sum("tau_in_Nm" in line for line in file.read_text().splitlines()) == 1, "a channel is one line"
+
+
+def test_the_intervals_of_a_baseline_by_hand():
+    """Pairs of repeats that differ by 0.2 in bias and by ln 1.1 in ln error: two degrees of freedom."""
+    one = batch([5.0, 5.5, 5.0, 5.5], biases=[1.0, 1.2, -0.5, -0.3])
+    made = make_baseline({"b": one}, LIMITS, "2026-01-01", "abc", "first")
+    # The spread of a bias is sqrt(0.02); that of a difference of two means of four sqrt(2 / 4) of it, which is 0.1.
+    # Quantiles of 0.995 and 0.99 are 9.9248 and 6.9646.
+    reach = 6.9646 * np.log(1.1) / np.sqrt(2) * np.sqrt(4 * (25.0**2 + 30.25**2) / 110.5**2)
+    error, scatter = np.sqrt(27.625), np.sqrt(27.625 - 0.35**2)
+    expected = {
+        "bias": [0.35, 0.35 - 0.99248, 0.35 + 0.99248],
+        "scatter": [scatter, scatter * np.exp(-reach), scatter * np.exp(reach)],
+        "error": [error, error * np.exp(-reach), error * np.exp(reach)],
+    }
+    accepted = made.batches["b"].sets["fitted"].channels["tau_in_Nm"].accepted
+    assert accepted == {name: [float(f"{v:.3g}") for v in row] for name, row in expected.items()}
 
 
 @pytest.mark.parametrize(

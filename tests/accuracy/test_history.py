@@ -13,6 +13,7 @@ from benchmarks.accuracy_gate import run_pipeline
 from builders import write_batch
 from ccmodel.accuracy.gate import fill_history
 from ccmodel.accuracy.history import COLUMNS, add_rows, head, overview, read_history, rows_of
+from ccmodel.accuracy.measure import BatchAccuracy, ChannelAccuracy, SetAccuracy
 from ccmodel.typed import InputError
 
 # A pipeline that "simulates" by taking files that stand in the repository.
@@ -61,6 +62,7 @@ def repository(measured, tmp_path, monkeypatch):
 
 
 def test_past_commits_are_run_and_measured_and_failures_are_lines(repository, measured):
+    shutil.copytree(repository / "stored/simulated/estimated", repository / "stored/simulated/nearest")
     first, good = git(repository, "rev-parse", "HEAD"), commit(repository, SNAKEFILE, "0.5.0")
     bad = commit(repository, FAILING, "0.5.1")
     heard, file = [], repository / "history.csv"
@@ -72,6 +74,7 @@ def test_past_commits_are_run_and_measured_and_failures_are_lines(repository, me
     table = read_history(file)
     assert set(table["commit"]) == {good}
     assert set(table["version"]) == {"0.5.0"}
+    assert set(table["set"]) == {"estimated"}, "no verdict accepts the nearest model"
     now = measured[1]["tiny"].sets["estimated"].channels
     for row in table.itertuples():
         assert row.error == pytest.approx(now[row.channel].error, rel=1e-3)
@@ -117,6 +120,24 @@ def test_rows_of_a_commit_replace_earlier_ones_and_stand_in_the_order_of_dates(m
     assert list(table.columns) == list(COLUMNS)
     assert list(dict.fromkeys(table["commit"])) == ["a", "b"]
     assert len(table) == 2 * len(batches["tiny"].sets["estimated"].channels)
+
+
+def test_a_row_has_bias_scatter_and_error_by_hand():
+    channel = ChannelAccuracy(biases=[3.0, -1.0], errors=[5.0, 7.0])
+    one = BatchAccuracy(
+        rig="rig",
+        origin="rig",
+        digest="",
+        verdict="agrees",
+        recordings={name: [0.0, 1.0, 100.0] for name in ("r-a", "r-b")},
+        sets={"fitted": SetAccuracy(fitted_to=[], channels={"tau_in_Nm": channel})},
+    )
+    (row,) = rows_of({"b": one}, "abc", "2026-01-01", "1").to_dict("records")
+    # Mean square 37, which is 1 of the bias and 36 of the scatter.
+    assert row == {
+        "commit": "abc", "date": "2026-01-01", "version": "1", "batch": "b", "channel": "tau_in_Nm", "set": "fitted",
+        "bias": 1.0, "scatter": 6.0, "error": 6.083, "verdict": "agrees",
+    }  # fmt: skip
 
 
 def test_dates_of_two_time_zones_are_in_their_order(measured, tmp_path):

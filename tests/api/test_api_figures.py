@@ -2,9 +2,11 @@
 
 import matplotlib
 import matplotlib.pyplot as plt
+import pandas as pd
 import pytest
 
 import ccmodel as cc
+from ccmodel.api import figures
 
 matplotlib.use("Agg")
 
@@ -77,6 +79,15 @@ def test_errors_of_a_diagnosis_are_over_the_noise_floor(found):
     assert [t.get_text() for t in ax.get_yticklabels()] == ["θ_out", "τ_in", "τ_out", "F_drive", "F_load"]
     ratios = found.errors["before"] / found.errors["noise"]
     assert [bar.get_width() for bar in ax.patches] == pytest.approx(list(ratios))
+    # A number next to the line of the noise floor is not crossed by it.
+    assert all(text.get_bbox_patch() is not None and text.get_zorder() > ax.lines[0].get_zorder() for text in ax.texts)
+
+
+def test_errors_of_the_extended_model_are_called_as_on_the_page(batch):
+    table = pd.DataFrame({"before": [3.0], "after": [1.0], "noise": [1.0], "unit": ["rad"]}, index=["theta_out"])
+    figure = figures.errors(table, batch, "explained")
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "extended model" in labels and "best model" not in labels
 
 
 def test_reports_leave_the_backend_of_a_session_alone(found, tmp_path):

@@ -216,6 +216,12 @@ def test_a_fit_says_where_its_intervals_come_from_and_what_it_cannot_judge(fitte
     assert "note: friction apart from bend" in fitted._repr_html_()
 
 
+def test_a_fit_that_errs_says_what_its_intervals_lack(fitted, monkeypatch):
+    monkeypatch.setattr(cc.Fit, "mean_square", 23.2)
+    (line, *_) = fitted.warnings
+    assert "depend on the weights of the residuals, and the intervals do not include this; 'ccmodel diagnose'" in line
+
+
 def test_a_motion_may_be_a_frame_a_dataset_or_a_file(fitted, tmp_path):
     MOTION.to_csv(tmp_path / "motion.csv", index=False)
     by_time = MOTION.set_index("time_s")

@@ -39,7 +39,18 @@ def test_a_motion_that_cannot_be_simulated_is_refused_by_name(fitted, motion, li
 @pytest.mark.parametrize(
     "text, line",
     [
-        ("time_s;theta_in_rad\n0;0\n1;1\n", "the separator is ';'; a comma is expected"),
+        (
+            "time_s;theta_in_rad\n0;0\n1;1\n",
+            "its columns are separated by ';'; use commas, and decimal points in numbers",
+        ),
+        (
+            "time_s;theta_in_rad\n0;0\n0,1;0,25\n",
+            "its columns are separated by ';'; use commas, and decimal points in numbers",
+        ),
+        (
+            "time_s\ttheta_in_rad\n0\t0\n",
+            "its columns are separated by tabs; use commas, and decimal points in numbers",
+        ),
         ("time_s,theta_in_rad\n0,0\n1,\n2,1\n", "row 3: theta_in_rad is empty"),
         ("time_s,theta_in_rad\n0,0\n\n2,1\n", "row 3: time_s is empty"),
         ("time_s,theta_in_rad\n0,0\n1,inf\n", "row 3: theta_in_rad is no finite number: 'inf'"),

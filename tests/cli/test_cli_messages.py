@@ -45,6 +45,10 @@ CHECKS = {
     "a model that is text": (["predict", "raw/loops", "--model", "a-file", "--out", "out"], "a-file: "),
     "a model that is a folder": (["predict", "raw/loops", "--model", "raw", "--out", "out"], "raw: is a folder"),
     "other JSON as a model": (["predict", "raw/loops", "--model", "other.json", "--out", "out"], "other.json: "),
+    "a diagnosis as a model": (
+        ["predict", "raw/loops", "--model", "broken/diagnosis.json", "--out", "out"],
+        "broken/diagnosis.json: is a diagnosis, not a model; use broken/model.json beside it",
+    ),
     "no motion": (["simulate", "no.csv", "--model", "other.json", "--out", "s.csv"], "no.csv: there is no such file"),
     "logs that are not there": (["import", "no.csv", "--out", "new"], "no.csv"),
     "no map": (["import", "a-file", "--map", "no.yaml", "--out", "new"], "no.yaml: there is no such map"),
@@ -144,6 +148,32 @@ def test_a_suggested_command_can_be_copied(folder, run):
             ["compensate", "fit.json", "--wanted", "wanted.csv", "--out", "d.csv", "--max-acceleration", "1"],
             "--max-acceleration: needs --max-speed too",
         ),
+        (
+            ["simulate", "motion.csv", "--model", "rig.json", "--out", "s.csv", "--recording", "x"],
+            "--recording: the model knows a; got x",
+        ),
+        (
+            ["compensate", "rig.json", "--wanted=wanted.csv", "--out=d.csv", "--recording=x"],
+            "--recording: the model knows a; got x",
+        ),
+        (
+            ["estimate", "raw/loops", "--model", "fit.json", "--out", "out", "--tolerance", "tau_out_Nm=0.02"],
+            "--tolerance: an estimate has those of tau_in_Nm and theta_out_rad; got 'tau_out_Nm'",
+        ),
+        (
+            ["diagnose", "raw/loops", "--out", "out", "--freeze"],
+            "--freeze: there is no baseline to freeze; state its file, baseline=FILE or --baseline FILE",
+        ),
+        (["diagnose", "raw/loops", "--out", "out", "--time-limit", "-1"], "--time-limit: "),
+        (["diagnose", "raw/loops", "--out", "out", "--run-limit", "0"], "--run-limit: "),
+        (
+            ["diagnose", "raw/loops", "--out", "out", "--suspect", "kink at moon"],
+            "--suspect is now called --candidate\n--candidate: ",
+        ),
+        (["diagnose", "raw/loops", "--out", "out", "--keep-law", "A b"], "--keep-law: 'A b' is no name"),
+        (["fit", "raw/loops", "--out", "f.json", "--tolerance", "2"], "--tolerance: "),
+        # A file that has the name of an option.
+        (["simulate", "recording", "--model", "fit.json", "--out", "s.csv"], "recording: no column time_s"),
     ],
 )
 def test_an_option_is_named_as_it_was_typed(words, line, folder, run, tmp_path, monkeypatch):
@@ -151,6 +181,10 @@ def test_an_option_is_named_as_it_was_typed(words, line, folder, run, tmp_path, 
     monkeypatch.chdir(tmp_path)
     for name in ("fit.json", "model.json"):
         Path(name).write_text(json.dumps(model_as_dict(CABLE, {})))
+    condition = {"recording": "a", "pretension_N": 7.0, "conduit": [{"length_m": 1.0, "bend_rad": 3.0}]}
+    rig = {"batch": "b", "origin": "rig", "far_end": None, "conditions": [condition]}
+    Path("rig.json").write_text(json.dumps(model_as_dict(CABLE, {}) | {"rig": rig}))
+    Path("recording").write_text("t\n1\n")
     for name, angle in (("motion.csv", "theta_in_rad"), ("wanted.csv", "theta_out_rad")):
         Path(name).write_text(f"time_s,{angle}\n0,0\n0.1,0.1\n")
     ended = run(*words)
@@ -190,10 +224,10 @@ def test_a_file_is_tried_before_the_work(out, message, folder, run, monkeypatch)
     assert message in ended.err
 
 
-def said(verdict, findings=()):
+def said(verdict, findings=(), not_judged=()):
     """A diagnosis that takes no time and writes nothing."""
-    batch = SimpleNamespace(findings=findings)
-    found = SimpleNamespace(verdict=verdict, headline="it is as it is", report={"verdict": verdict}, batch=batch)
+    batch, report = SimpleNamespace(findings=findings), {"verdict": verdict, "not_judged": not_judged}
+    found = SimpleNamespace(verdict=verdict, headline="it is as it is", report=report, batch=batch)
     return lambda *_, **__: found
 
 
@@ -223,6 +257,43 @@ def test_a_diagnosis_names_the_files_that_were_refused(folder, run, monkeypatch)
     monkeypatch.setattr("ccmodel.diagnose", said("agrees", (gap, empty)))
     ended = run("diagnose", folder / "raw/loops", "--out", folder / "out")
     assert (ended.code, ended.err) == (0, "refused: raw/loops/b.csv: is empty\n")
+
+
+@pytest.mark.parametrize(
+    "what, why, remedy",
+    [
+        (
+            "further candidates",
+            "the limit of 9,000 model runs was reached before all of them were fitted",
+            "; repeat with a higher --run-limit",
+        ),
+        (
+            "further candidates",
+            "the time limit of 160 s was reached before all of them were fitted",
+            "; repeat with a higher --time-limit, such as 900",
+        ),
+        (
+            "the place of the mismatch",
+            "the limit was reached before the model was fitted without each channel",
+            "; repeat with a higher --run-limit or a higher --time-limit, such as 900",
+        ),
+        ("friction apart from bend", "one bend angle", ""),
+    ],
+)
+def test_a_diagnosis_says_what_it_did_not_judge_and_what_to_do_about_a_limit(
+    what, why, remedy, folder, run, monkeypatch
+):
+    refused = {"what": "b.csv", "why": "is empty", "refused": True}
+    monkeypatch.setattr("ccmodel.diagnose", said("unexplained", (), ({"what": what, "why": why}, refused)))
+    words = ["diagnose", folder / "raw/loops", "--out", folder / "out"]
+    assert run(*words).err == f"warning: not judged: {what}: {why}{remedy}\n"
+    assert run(*words, "--quiet").err == ""
+
+
+def test_contradictions_are_those_of_the_headline(folder, run, monkeypatch):
+    contradiction = {"what": "a.csv", "why": "is 0 throughout", "confidence": 1.0}
+    monkeypatch.setattr("ccmodel.diagnose", said("inputs-inconsistent", (), (contradiction,)))
+    assert run("diagnose", folder / "raw/loops", "--out", folder / "out").err == ""
 
 
 def test_no_text_of_a_file_steers_the_terminal(run, tmp_path):

@@ -68,6 +68,7 @@ SINGLES = [(90.0, KINK, -100.0), (95.0, SCALE, -110.0), (80.0, FRICTION, -120.0)
 def repeats(monkeypatch):
     """Friction that differs between recordings as from run to run."""
     monkeypatch.setattr(comparisons, "friction_p_values", lambda whitened, residuals, is_fitted: (0.5, 0.5))
+    monkeypatch.setattr(comparisons, "scatter_p_value", lambda whitened, residuals, is_fitted: 0.5)
 
 
 def fitted(mean_square, *acting, **values):
@@ -387,6 +388,32 @@ def test_friction_that_does_not_repeat_speaks_against_a_candidate(monkeypatch):
     assert found.probability[0] > 0.9
 
 
+DRIFT = ("friction-drift", "conduit")
+
+
+def test_friction_that_differs_between_recordings_is_something_unlisted(monkeypatch):
+    """It leaves no residuals, since each recording has a friction of its own."""
+    assert verdict(evidence(NONE), model=fitted(1.0)).verdict == "agrees"
+    monkeypatch.setattr(comparisons, "friction_p_values", lambda w, residuals, is_fitted: (1e-3, 0.5))
+    monkeypatch.setattr(comparisons, "scatter_p_value", lambda w, residuals, is_fitted: 1e-3)
+    assert verdict(evidence(NONE), model=fitted(1.0)).verdict == "unexplained"
+
+
+@pytest.mark.parametrize("left, is_named", [(0.5, True), (0.02, False)])
+def test_a_drift_accounts_for_how_friction_differs(left, is_named, monkeypatch):
+    """`left` is the p-value of what it leaves of the scatter of friction."""
+    p_values = {True: (left, 0.5), False: (1e-3, 1e-3)}
+    monkeypatch.setattr(
+        comparisons, "friction_p_values", lambda w, residuals, is_fitted: p_values[residuals == "drift"]
+    )
+    monkeypatch.setattr(comparisons, "scatter_p_value", lambda w, residuals, is_fitted: left)
+    values = {"friction-drift/conduit/change": 0.15}
+    drift = replace(fitted(1.0, DRIFT, **values), residuals="drift")
+    found = verdict(evidence(NONE - 20, size=1.0), (drift, evidence(NONE)), model=fitted(2.0))
+    assert (found.comparison.confidence_in(DRIFT[0]) >= DECIDED) == is_named
+    assert (found.verdict == "explained") == is_named
+
+
 def test_where_nothing_can_be_held_out_a_complete_model_has_less_probability():
     friction = fitted(1.0, FRICTION)
     given = evidence(), (friction, evidence(NONE, NONE))
@@ -666,12 +693,14 @@ def test_a_discounted_mechanism_is_settled_with_a_discounted_probability():
     assert alone.is_settled
 
 
-def test_a_scattered_strength_has_the_prior_of_the_laws_that_were_tried(monkeypatch):
+def test_a_scattered_strength_is_not_supported_by_laws_that_were_tried(monkeypatch):
+    """What differs from recording to recording as much as by chance is not identified."""
     monkeypatch.setattr(CandidateFit, "log_support", lambda self, name, place: 0.0)
     found = compared(evidence(), (fitted(1.0, FRICTION), evidence(NONE)), model=fitted(61.0))
     tried = replace(found, laws_beside=frozenset([found.base.hypothesis]))
-    assert found.probability[0] == pytest.approx(priors_of_further(False)[0], rel=1e-3)
-    assert tried.probability[0] == pytest.approx(priors_of_further(False, laws_tried=True)[0], rel=1e-3)
+    for one in (found, tried):
+        assert one.probability[0] == pytest.approx(priors_of_further(False)[0], rel=1e-3)
+        assert one.probability[0] < DECIDED
 
 
 def test_a_law_imitates_what_is_no_law():

@@ -1,6 +1,8 @@
 """The gate in the pipeline: the study, its part of the page, and the three commands."""
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +12,7 @@ import yaml
 from test_pipeline import snakemake
 
 from builders import write_batch
+from ccmodel.accuracy.baseline import make_baseline, versions
 from ccmodel.accuracy.gate import state_of
 from ccmodel.accuracy.history import now, read_history
 from ccmodel.provenance import file_digest
@@ -82,6 +85,55 @@ def test_from_no_baseline_to_a_loss(finished):
     said = accuracy(finished, "check")
     assert (said.returncode, said.stderr.count("\n")) == (2, 1)
     assert "format 9" in said.stderr
+
+
+def git(folder: Path, *arguments: str) -> str:
+    command = ["git", "-c", "user.name=a", "-c", "user.email=a@b", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
+
+
+@pytest.mark.long
+def test_an_accepted_baseline_states_the_commit_and_the_versions_of_the_run(finished, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(finished, folder, copy_function=shutil.copy2)
+    shutil.rmtree(folder / "config", ignore_errors=True)
+    git(folder, "init", "-q")
+    (folder / "notes").write_text("1")
+    git(folder, "add", "notes", "config.yaml")
+    git(folder, "commit", "-qm", "one")
+    (folder / "notes").write_text("2")
+    assert snakemake(folder).returncode == 0
+    state = folder / "results/tables/baseline.json"
+    measured = json.loads(state.read_text())
+    assert measured["commit"].endswith("+") and measured["versions"] == versions()
+
+    git(folder, "commit", "-qam", "two")
+    assert "Making study baseline" in snakemake(folder, "--dry-run").stdout
+    assert snakemake(folder).returncode == 0
+    assert "Nothing to be done" in snakemake(folder, "--dry-run").stdout
+    measured = json.loads(state.read_text()) | {"versions": {"ccmodel": "0.0", "numpy": "0.1"}}
+    state.write_text(json.dumps(measured))
+    assert accuracy(folder, "accept", "--reason", "why").returncode == 0
+    accepted = json.loads((folder / "config/baseline.json").read_text())
+    assert accepted["commit"] == git(folder, "log", "-1", "--format=%h")
+    assert accepted["versions"] == {"ccmodel": "0.0", "numpy": "0.1"}
+    assert set(read_history(folder / "config/history.csv")["version"]) == {"0.0"}
+
+    # An older baseline takes its place.
+    assert snakemake(folder).returncode == 0
+    (folder / "config/baseline.json").write_text(json.dumps(accepted | {"reason": "another"}))
+    os.utime(folder / "config/baseline.json", (0, 0))
+    assert "Making study baseline" in snakemake(folder, "--dry-run").stdout
+
+
+def test_the_versions_are_those_of_the_run(measured):
+    assert state_of(measured / "out/results").versions == versions(), "a run of before does not state them"
+    file = measured / "out/results/tables/baseline.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"versions": {"numpy": "0.1"}}))
+    state = state_of(measured / "out/results")
+    assert state.versions == {"numpy": "0.1"}
+    accepted = make_baseline({}, state.limits, state.date, state.commit, "why", state.versions)
+    assert accepted.versions == {"numpy": "0.1"}
 
 
 @pytest.fixture

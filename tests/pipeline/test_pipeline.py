@@ -361,6 +361,27 @@ def test_a_log_is_read_again_if_an_older_one_takes_its_place(copy):
 
 
 @pytest.mark.long
+def test_a_page_is_written_again_if_an_older_file_takes_the_place_of_what_it_reads(copy):
+    """As `mv` does with what an import has left out, and with what was concealed."""
+    (findings, concealed), older = (copy / "data/raw/findings.json", copy / "concealed.json"), "older"
+    findings.write_text("[]")
+    concealed.write_text(json.dumps({"format": 1, "rigs": []}))
+    keep_one_study(copy, studies={}, concealed="concealed.json")
+    assert snakemake(copy).returncode == 0
+    assert "Nothing to be done" in snakemake(copy, "--dry-run").stdout
+    left_out = {"batch": "b", "file": older, "row": None, "column": None, "text": "empty", "severity": "refused"}
+    rig = {"batches": ["tiny"], "effects": [{"text": older}]}
+    for file, content in ((findings, [left_out]), (concealed, {"format": 1, "rigs": [rig]})):
+        before = file.read_text()
+        file.write_text(json.dumps(content))
+        os.utime(file, (0, 0))
+        assert "Writing the page" in snakemake(copy, "--dry-run").stdout
+        file.write_text(before)
+        os.utime(file, (0, 0))
+        assert "Nothing to be done" in snakemake(copy, "--dry-run").stdout
+
+
+@pytest.mark.long
 def test_a_new_batch_appears_with_three_lines_of_config(copy):
     write_batch(copy / "data/raw/added", pretensions=(5.0,))
     keep_one_study(copy, accuracy={})

@@ -98,6 +98,14 @@ def test_the_fall_is_that_of_the_largest_error_of_any_channel():
     assert card["largest"] == {"before": card["rows"][0]["before"], "after": 4.0}
 
 
+def test_the_fall_of_several_batches_is_the_median():
+    found = [diagnosis(f"b{k}", "explained") for k in range(3)]
+    for d, before, after in zip(found, (6.0, 9.0, 60.0), (1.2, 1.5, 1.8), strict=True):
+        d["fit"] = d["fit"] | {"error": {"tau_out": {"before": before, "after": after, "noise": 1.0, "unit": "N*m"}}}
+    (line,) = overview(cards([summary(d["batch"]) for d in found], found))
+    assert line.endswith("9.0 → 1.5 (extended model, median of 3).")
+
+
 def test_the_overview_says_held_out_of_held_out_recordings_alone():
     (card,) = made("explained")
     assert "Largest held-out error over noise" in " ".join(overview([card | {"held_out": 3}]))

@@ -167,6 +167,43 @@ def test_all_possible_places_of_a_mismatch_are_said():
     )
 
 
+LIMIT = {
+    "what": "further candidates",
+    "why": "the limit of 9,000 model runs was reached before all of them were fitted",
+}
+NO_PLACE = {"what": "the place of the mismatch", "why": "the limit was reached before"}
+
+
+def test_that_the_place_is_found_by_elimination_is_said():
+    conduit = {"place": "conduit", "places": ["conduit"], "channels": [], "phases": [], "text": ""}
+    said = sentence(diagnosis("b", "unexplained", location=conduit))
+    assert (
+        said
+        == "Something is missing, most likely at the conduit (by elimination), and no listed mechanism explains it."
+    )
+    several = conduit | {"places": ["conduit", "load"]}
+    assert "at the conduit or the load, and" in sentence(diagnosis("b", "unexplained", location=several))
+
+
+@pytest.mark.parametrize(
+    ("not_judged", "where"), [([LIMIT], ", most likely at the load pulley"), ([LIMIT, NO_PLACE], "")]
+)
+def test_after_a_limit_the_headline_does_not_speak_of_what_was_not_fitted(not_judged, where):
+    assert sentence(diagnosis("b", "unexplained", not_judged=not_judged)) == (
+        f"Something is missing{where}. The search ended at its limit before all candidates were fitted, and none of"
+        " those fitted explains it."
+    )
+
+
+def test_a_place_that_was_not_looked_for_is_not_stated():
+    found = diagnosis("b", "unexplained", not_judged=[NO_PLACE])
+    assert possible_places(found) == []
+    assert sentence(found) == "Something is missing and no listed mechanism explains it."
+    found["location"]["place"] = "conduit"
+    assert nearest_sentence(found).startswith("Nearest model, not accepted: ")
+    assert possible_places(diagnosis("b", "explained", not_judged=[NO_PLACE])) == ["load-pulley"]
+
+
 def test_two_mechanisms_are_both_said_with_their_confidence():
     said = sentence(diagnosis("b", "explained", mechanisms=[BACKLASH, SCALE]))
     assert said.index("dead zone") < said.index("confidence 0.97; and the load's torque sensor")

@@ -97,6 +97,19 @@ def test_rest(drive, load, rest_s):
     assert abs(theta[resting]).max() <= STEP
 
 
+def test_a_rest_is_as_long_on_a_clock_that_does_not_begin_at_zero():
+    for still, rest_s in ((9, 0.0), (40, 100.39)):
+        table = log([7] * still + list(range(8, 68 - still)), [0] * 60)
+        assert calibrate(table.assign(time_s=table.time_s + 100.0), rig()).rest_s == pytest.approx(rest_s)
+
+
+def test_the_motors_angle_is_zero_at_the_mean_of_its_rest():
+    table = log([7] * 40 + list(range(8, 28)), motor_encoder_counts=[100, 104] * 20 + [102 + 10 * k for k in range(20)])
+    motor = calibrate(table, rig(motor_counts_per_rev=1000)).channels["theta_motor_rad"]
+    # About 102 counts: 2 counts of 1000 to either side, and 190 at the end.
+    assert motor[[0, 1, -1]] == pytest.approx(2 * np.pi * np.array([-0.002, 0.002, 0.19]))
+
+
 @given(
     theta=st.lists(st.floats(-10, 10), min_size=2, max_size=20),
     tension_1=st.lists(st.floats(0, 50), min_size=20, max_size=20),

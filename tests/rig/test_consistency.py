@@ -49,6 +49,7 @@ NOT_MEASURED = (
     "another rig",
     "magnitude",
     "single",
+    "mN m",
 )
 
 
@@ -120,6 +121,19 @@ def test_a_mistake_in_a_simulated_batch_is_named(mistake):
 def test_a_mistake_in_a_measured_batch_is_named(measured, mistake):
     found = outcome(measured, mistake, 1, [OTHER])
     assert found.named, found.said
+
+
+@pytest.mark.parametrize("factor", [10, 1000])
+@pytest.mark.parametrize("has_spring", [True, False])
+def test_a_load_torque_in_a_smaller_unit_is_no_wrong_angle_and_no_wrong_cell(factor, has_spring, tmp_path):
+    """Spring and stiffness are too large by it as well; the sum of tensions alone tells it from the angles."""
+    copy = read_copy(Path("data/raw/half-loop"))
+    for log in copy.logs.values():
+        log["load_current_A"] *= factor
+    if not has_spring:
+        del copy.rig["load"]["spring_stiffness_Nm_per_rad"]
+    (said,) = said_of(write_copy(copy, tmp_path / "unit"))
+    assert said.startswith("batch.yaml tau_out_Nm: the load torque over the radius reaches")
 
 
 @pytest.mark.parametrize("name", ["half-loop", "loops", "pretension", "radius", "rich"])

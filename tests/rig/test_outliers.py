@@ -4,7 +4,7 @@ from made_up_batch import table
 
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.rig.log import read_log
-from ccmodel.rig.outliers import frequent_outliers, outliers
+from ccmodel.rig.outliers import _distances, _few, _many
 
 TIME = np.linspace(0.0, 4.0, 2000)
 NOISE = np.random.default_rng(3).normal(size=TIME.size)
@@ -24,6 +24,14 @@ CHANNELS = {
     "spikes of a switching drive": NOISE * 0.01 + np.where(np.arange(TIME.size) % 97 == 5, 1.0, 0.0),
     "heavy tails": np.random.default_rng(4).standard_t(2.0, TIME.size),
 }
+
+
+def outliers(values):
+    return _few(*_distances(values))
+
+
+def frequent_outliers(values):
+    return _many(values, *_distances(values))
 
 
 @pytest.mark.parametrize("name", CHANNELS)

@@ -139,18 +139,21 @@ def test_one_tension_of_a_pair_is_kept_and_the_other_follows(bench, counted):
     assert recording["T3_N"] == pytest.approx(counted["T3_N"], abs=1e-6)
 
 
-@pytest.mark.parametrize("logged", ["F_drive_N", "tau_in_Nm"])
-def test_the_other_tension_follows_from_the_sum_or_the_torque(bench, counted, logged):
-    gone = {"F_drive_N", "tau_in_Nm"} - {logged}
-    one = counted["T1_N"]
-    changed(without_scales(bench), lambda t: in_si_units(t).drop(columns=list(gone)).assign(T1_N=one[: len(t)]))
+@pytest.mark.parametrize("logged", ["force", "torque"])
+@pytest.mark.parametrize(("one", "other"), [("T1_N", "T3_N"), ("T3_N", "T1_N"), ("T2_N", "T4_N"), ("T4_N", "T2_N")])
+def test_the_other_tension_follows_from_the_sum_or_the_torque(bench, counted, logged, one, other):
+    force, torque = ("F_drive_N", "tau_in_Nm") if one in ("T1_N", "T3_N") else ("F_load_N", "tau_out_Nm")
+    kept, derived = (force, torque) if logged == "force" else (torque, force)
+    given = counted[one]
+    changed(without_scales(bench), lambda t: in_si_units(t).drop(columns=derived).assign(**{one: given[: len(t)]}))
     recording = ingest_batch(bench.write().folder).recordings[0]
-    for channel in ("T3_N", *gone):
+    for channel in (other, derived):
         assert recording[channel] == pytest.approx(counted[channel], abs=1e-5), channel
-    (derived,), of = gone, recording.accuracy
-    cell, torque = of["T1_N"], bench.described["rig"]["accuracy"]["torque_Nm"] / R
-    expected = {"F_drive_N": np.hypot(2 * cell, torque), "tau_in_Nm": R * np.hypot(2 * cell, cell)}
+    of, cell = recording.accuracy, 0.1
+    sensor = cell if kept == force else 0.0001 / R
+    expected = {force: np.hypot(2 * cell, sensor), torque: R * np.hypot(2 * cell, sensor)}
     assert of[derived] == pytest.approx(expected[derived])
+    assert of[other] == pytest.approx(np.hypot(cell, sensor))
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -178,6 +181,15 @@ def test_the_tension_of_a_single_cable_is_its_load_cell(bench):
     assert (recording["F_drive_N"] == recording["T1_N"]).all()
     assert (recording["F_load_N"] == recording["T2_N"]).all()
     assert "tau_in_Nm" not in recording
+
+
+def test_the_tension_of_a_single_cable_without_a_load_cell_is_its_torque_over_the_radius(bench):
+    recording = single(bench, lambda t: in_si_units(t).drop(columns=["F_drive_N", "F_load_N"])).recordings[0]
+    logged = bench.tables["one"]
+    for tension, torque in (("T1_N", "tau_in_Nm"), ("T2_N", "tau_out_Nm")):
+        assert recording[tension] == pytest.approx(logged[torque].to_numpy() / 0.006)
+        # 0.1 mN m over 6 mm.
+        assert recording.accuracy[tension] == pytest.approx(0.1 / 6)
 
 
 def test_a_single_cable_has_no_cable_b(bench):

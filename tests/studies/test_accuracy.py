@@ -1,8 +1,10 @@
 """Bias and scatter recovered from numbers made with known ones; comparison errors of a model known to be off."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import builders
@@ -11,7 +13,7 @@ from ccmodel.inference.fit import FitResult
 from ccmodel.inference.intervals import Interval
 from ccmodel.model.model_input import ModelInput
 from ccmodel.model.parameters import Parameters
-from ccmodel.model.run import simulate, simulate_recording
+from ccmodel.model.run import PRESCRIBED, simulate, simulate_recording
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.steps.files import fitted, write_json
 from ccmodel.steps.ingest import ingest
@@ -20,7 +22,9 @@ from ccmodel.studies.accuracy.settings import Accuracy
 from ccmodel.studies.accuracy.study import (
     BY_RECORDING,
     Case,
+    _cases,
     _every_other,
+    _prescribed,
     _shifted,
     bias_and_scatter,
     comparison_table,
@@ -28,7 +32,7 @@ from ccmodel.studies.accuracy.study import (
     summary,
 )
 from ccmodel.studies.claims import model_runs
-from ccmodel.studies.loops.measures import Quantity
+from ccmodel.studies.loops.measures import QUANTITIES, Quantity, measure
 from ccmodel.studies.loops.settings import Measuring
 from model_runs import CABLE, STUDY
 from single_cable_batches import write_batch
@@ -58,6 +62,11 @@ def test_the_bias_is_that_of_the_values_and_not_of_their_logarithms():
 def test_the_scatter_of_three_pairs_by_hand():
     found = bias_and_scatter(np.exp([0.0, 0.1, 0.2]), np.ones(3), sigma_E=0.0, coverage=0.9)
     assert found.sigma_M == pytest.approx(0.1)
+    # t of 2 degrees of freedom at 95 % is 2.920.
+    reach = 2.920 * 0.1 / np.sqrt(3)
+    assert np.log([found.delta, found.delta_low, found.delta_high]) == pytest.approx(
+        [0.105, 0.105 - reach, 0.105 + reach], abs=1e-5
+    )
 
 
 def test_the_uncertainty_of_a_quantity_is_that_of_two_readings():
@@ -73,12 +82,16 @@ def test_the_uncertainty_of_a_quantity_is_that_of_two_readings():
         100.0 * np.sqrt(2) * np.hypot(0.012 / np.sqrt(12), slope * 4e-3)
     )
     assert sensor_uncertainty(replace(share, channels=("tau_in_Nm",)), one) is None
+    # An error of the torque acts along the whole stroke of 2 rad.
+    one = replace(one, accuracy=one.accuracy | {"tau_in_Nm": 5e-3})
+    assert sensor_uncertainty(QUANTITIES["work_lost"], one) == pytest.approx(1e3 * np.sqrt(2) * 5e-3 * 2, rel=1e-3)
 
 
-def test_the_bias_lies_in_its_interval_as_often_as_stated():
+@pytest.mark.parametrize("pairs", [4, 12])
+def test_the_bias_lies_in_its_interval_as_often_as_stated(pairs):
     hits = 0
     for seed in range(400):
-        found = bias_and_scatter(*made(0.9, 0.06, 0.03, 12, seed), sigma_E=0.03, coverage=0.9)
+        found = bias_and_scatter(*made(0.9, 0.06, 0.03, pairs, seed), sigma_E=0.03, coverage=0.9)
         hits += found.delta_low < 0.9 < found.delta_high
     assert hits / 400 == pytest.approx(0.9, abs=0.05)
 
@@ -139,7 +152,7 @@ def test_a_model_that_is_off_by_more_is_not():
 def test_each_batch_has_a_colour_and_a_marker_of_its_own(drawn):
     every = [replace(c, recorded=replace(c.recorded, batch=name)) for name in ("b", "c", "d") for c in cases()]
     table = comparison_table(every, ASKED, HOW)
-    axes = drawn(table, summary(table, ASKED)).axes[0]
+    axes = drawn(table, summary(table, ASKED), ASKED.coverage_factor).axes[0]
     of_batch = {line.get_label(): line for line in axes.lines if str(line.get_label()).startswith("batch")}
     assert list(of_batch) == ["batch b", "batch c", "batch d"]
     for style in ("get_color", "get_marker"):
@@ -204,10 +217,71 @@ def test_a_single_cable_with_a_measured_tension_has_uncertainties_of_its_own(tmp
     )
     fine, coarse = simulate(given, parameters), simulate(thinned, parameters)
     assert np.abs(coarse["tau_in_Nm"] - fine["tau_in_Nm"][::2]).max() < 0.02 * np.ptp(fine["tau_in_Nm"])
-    assert _shifted(Case(measured, fine, parameters, {}, False))["pretension_scale"] > 1.0
+    shifted = _shifted(Case(measured, fine, parameters, {}, False))["pretension_scale"]
+    accuracy = max(measured.accuracy[tension] for tension in measured.tensions)
+    assert shifted == pytest.approx(1.0 + accuracy / measured.pretension_N) and shifted > 1.0
 
 
 def test_the_motors_angle_is_thinned_with_the_drives():
     drive = recording(theta_in_rad=np.sin, theta_motor_rad=np.sin)
     given = ModelInput.of(drive)
     assert _every_other(given).theta_motor.size == _every_other(given).theta_in.size
+
+
+def test_the_numerical_uncertainty_is_the_change_with_half_the_samples_and_adds_in_squares():
+    (case, *_) = cases(accuracy=1e-9)
+    table = comparison_table([replace(case, input_sd={})], ASKED, HOW).set_index("quantity")
+    thinned = _every_other(ModelInput.of(case.recorded))
+    coarse = measure(simulate(thinned, case.parameters), ["lost_motion"], HOW)[0]["lost_motion"]
+    lost = table.loc["lost_motion"]
+    assert lost["u_num"] == pytest.approx(abs(coarse - lost["modelled"]), rel=1e-6) and lost["u_num"] > 10 * lost["u_D"]
+    assert lost["u_val"] == pytest.approx(np.hypot(lost["u_num"], lost["u_D"]), rel=1e-12)
+
+
+def test_a_quantity_with_a_channel_that_the_model_was_given_is_not_judged_apart_from_the_drives_angle():
+    (case, *_) = cases()
+    assert case.modelled.derived_from["theta_in_rad"] == PRESCRIBED
+    assert not _prescribed(QUANTITIES["lost_motion"], case.modelled)
+    sources = dict(case.modelled.derived_from) | {"tau_out_Nm": PRESCRIBED}
+    given = replace(case, modelled=replace(case.modelled, derived_from=sources))
+    every, judged = (set(comparison_table([one], ASKED, HOW)["quantity"]) for one in (case, given))
+    assert every - judged == {"tau_out", "width", "backlash"}
+
+
+def test_a_case_is_fitted_if_the_fit_had_its_recording():
+    (case, *others) = cases()
+    fit = SimpleNamespace(parameters=case.parameters, sds={}, recordings=["b/r0-a"])
+    pairs = [(one.recorded, one.modelled) for one in (case, *others)] + [(case.recorded, None)]
+    assert [one.fitted for one in _cases(SimpleNamespace(fitted=fit, pairs=pairs))] == [True, False, False]
+
+
+# Three recordings, two of them of one condition.
+BY_HAND = pd.DataFrame(
+    {"batch": "b", "recording": ["r-a", "r-b", "s"], "origin": "rig", "quantity": "width", "unit": "mN·m"}
+    | {"recorded": 100.0, "modelled": [99.0, 101.0, 97.0], "E": [-1.0, 1.0, -3.0]}
+    | {"u_num": 12.0, "u_input": 4.0, "u_sensor": 3.0, "u_repeat": 0.0, "u_D": 3.0, "u_val": 13.0}
+    | {"within": True, "fitted": [True, False, False], "inputs_left_out": ["", "x", "x y"]}
+)
+
+
+def test_a_summary_by_hand():
+    (line,) = summary(BY_HAND, ASKED)
+    assert line["sigma_E_stated"] == pytest.approx(0.05), "data and inputs: 3 and 4 of 100"
+    assert (line["E_mean"], line["E_rms"]) == pytest.approx((-1.0, np.sqrt(11 / 3)))
+    assert (line["repeats"], line["fitted"], line["within"], line["recordings"]) == (1, 1, 3, 3)
+    assert line["inputs_left_out"] == ["x", "y"]
+
+
+def test_the_bands_reach_as_many_standard_deviations_as_the_coverage_factor():
+    (line,) = summary(BY_HAND, ASKED)
+    line |= {"delta": 0.5, "sigma_M": 0.1}
+    ax = ratio_figure(BY_HAND, [line], 3.0).axes[0]
+    drawn = {str(one.get_label()): one.get_ydata() for one in ax.lines}
+    assert drawn["batch b"] == pytest.approx([99.0, 101.0, 97.0])
+    assert drawn["± 3 σ_E, sensors and parameters"] == pytest.approx([115.0, 115.0])
+    assert drawn["the model's bias δ"] == pytest.approx([50.0, 50.0])
+    assert min(one.get_ydata()[0] for one in ax.lines if one.get_linestyle() == "--") == pytest.approx(85.0)
+    (band,) = ax.collections
+    heights = band.get_paths()[0].vertices[:, 1]
+    assert band.get_label() == "± 3 σ_M of the model about it"
+    assert (heights.min(), heights.max()) == pytest.approx((35.0, 65.0))

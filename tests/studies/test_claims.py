@@ -7,14 +7,24 @@ import numpy as np
 import pytest
 
 from ccmodel.errors import last_cycle
-from ccmodel.repeats import Estimate, condition_of, estimates, pooled_scatter
+from ccmodel.repeats import Estimate, condition_of, difference, estimates, pooled_scatter
 from ccmodel.report.figures import save_figure
-from ccmodel.studies.claims import model_runs, study
-from ccmodel.studies.claims.claim import Row, Verdict
+from ccmodel.studies.claims import model_alone, model_runs, study
+from ccmodel.studies.claims.claim import Row, Verdict, spread_percent
 from ccmodel.studies.claims.figure import _reach, model_figure, recordings_figure
-from ccmodel.studies.claims.recordings import _is_seen, _model_has_sign, _phases_seen, _Series
+from ccmodel.studies.claims.recordings import (
+    _has_sign,
+    _is_seen,
+    _model_has_sign,
+    _of_one_origin,
+    _phases_seen,
+    _sentence_and_rows,
+    _Series,
+    _with_interval,
+)
 from ccmodel.studies.claims.settings import Claims
 from ccmodel.studies.claims.study import claims_of
+from ccmodel.studies.loops.measures import measure
 from ccmodel.studies.loops.settings import Measuring
 from ccmodel.studies.variables import batches_by_origin
 from model_runs import CABLE, STUDY
@@ -239,3 +249,154 @@ def test_phases_are_seen_with_certainty_or_not_determined():
     assert _phases_seen([True, None, True], [True, False, False]) == Verdict.NO
     assert _phases_seen([True, True, False], [True, True, False]) == Verdict.NO
     assert _is_seen(Estimate(20.0, 0.0, 0, 1), CLAIMS) is None, "no repeats"
+
+
+@pytest.mark.parametrize(
+    "seen_a, seen_b",
+    [("-+-", "+--"), ("++-", "---"), ("+++", "+--"), ("++-", "+-+")],
+    ids=["no IVa at the lowest", "no IVb at the lowest", "IVa at the highest", "IVb at the highest"],
+)
+def test_each_phase_at_each_end_of_the_pretensions_can_contradict(seen_a, seen_b):
+    assert _phases_seen(*([mark == "+" for mark in seen] for seen in (seen_a, seen_b))) == Verdict.NO
+
+
+def test_the_measured_recordings_of_a_study_are_judged_if_there_are_any():
+    measured, simulated = ((SimpleNamespace(origin=origin), None) for origin in ("rig", "virtual-rig"))
+    assert _of_one_origin([simulated, measured]) == [measured]
+    assert _of_one_origin([simulated, simulated]) == [simulated, simulated]
+
+
+@pytest.mark.parametrize(
+    "quantity, value, ends", [("slack_share", 1.0, (0, 3)), ("slack_share", 99.0, (97, 100)), ("width", 1.0, (-1, 3))]
+)
+def test_an_interval_of_a_share_stays_a_share(quantity, value, ends):
+    """t of 1000 degrees of freedom at 95 % is 1.646."""
+    row = _with_interval(Row(quantity, "", "a", 0.0, ""), Estimate(value, 2 / 1.6464, 1000, 2), 0.9)
+    assert (row.low, row.high) == pytest.approx(ends, abs=1e-3) and row.recordings == 2
+
+
+@pytest.mark.parametrize(
+    "means, sd, verdict",
+    [
+        ([100, 103, 106], 1.0, Verdict.YES),
+        ([100, 102, 106], 1.0, Verdict.OPEN),
+        ([100, 40, 101], 1.2, Verdict.NO),
+        ([100, 40, 101], 1.4, Verdict.OPEN),
+        ([100, 40, 97], 2.5, Verdict.NO),
+    ],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_trend_by_hand(means, sd, verdict, sign):
+    """A difference holds to 1.646 sqrt(2) sd, 2.33, 2.79, 3.26 or 5.82; a change below 5 % of the mean of 80 is 4.0."""
+    found = _Series([], [Estimate(float(sign * mean), sd, 1000, 2) for mean in means])
+    assert _has_sign(found, sign, CLAIMS) == verdict
+
+
+def test_a_difference_has_the_uncertainty_of_both():
+    assert difference(Estimate(1.0, 0.3, 4, 2), Estimate(5.0, 0.4, 4, 3)) == Estimate(4.0, 0.5, 4, 5)
+
+
+def test_a_spread_is_over_the_mean():
+    assert (spread_percent([1.0, 3.0]), spread_percent([-1.0, -3.0])) == (100.0, 100.0)
+    assert spread_percent([1.0]) is None
+
+
+def test_the_intervals_that_hold_the_model_are_counted():
+    rows = [Row("width", "", "a", 0.0, "", 2, 2.0, 1.0, 3.0, model) for model in (2.0, 0.5, 3.5, None)]
+    rows.append(Row("width", "", "a", 0.0, "", 1, 2.0, model=2.0))
+    sentence, found = _sentence_and_rows({"width": _Series(rows, [])})
+    assert found == rows and sentence.endswith("The model lies within 1 of 3 intervals.")
+
+
+def test_the_models_backlash_over_radii_at_one_pretension_has_a_row_of_its_own(found):
+    (row,) = (row for row in found["radius"].rows if row.condition == "all radii, one pretension")
+    runs = [model_runs.run(CABLE, path, STUDY) for path, _ in over_radii()]
+    backlashes = [measure(run, ["backlash"], HOW)[0]["backlash"] for run in runs]
+    assert row.model == pytest.approx(100 * np.ptp(backlashes) / np.mean(backlashes), rel=1e-6)
+
+
+def test_a_sliding_cable_loses_its_tension_by_the_capstan_equation():
+    run = model_runs.run(CABLE, model_runs.even(STUDY), STUDY)
+    assert np.log(run["T1_N"] / run["T2_N"]).max() == pytest.approx(0.156 * np.pi, rel=1e-6)
+
+
+def test_the_loop_is_placed_in_a_conduit_of_the_same_length():
+    loop = 0.0635 * np.pi
+    for place, path in model_runs.placements(STUDY).items():
+        lengths = {"drive": [loop, 1.2 - loop], "middle": [0.6 - loop / 2, loop, 0.6 - loop / 2]}
+        wanted = lengths.get(place.split()[2], [1.2 - loop, loop])
+        assert path.piece_length_m == pytest.approx(wanted)
+        assert path.piece_length_m[path.piece_bend_rad > 0] == pytest.approx(loop)
+        assert path.piece_bend_rad.sum() == pytest.approx(np.pi)
+
+
+def test_the_error_of_a_discretisation_is_that_of_its_worst_channel():
+    """Off by +-3 % of peak to peak in one channel and by 1 % in another."""
+    exact = model_runs.run(CABLE, model_runs.even(STUDY), STUDY)
+    span = {c: np.ptp(exact[c][last_cycle(exact)]) for c in ("T2_N", "tau_in_Nm")}
+    signs = np.where(np.arange(exact.time_s.size) % 2, 1.0, -1.0)
+    off = {
+        "T2_N": exact["T2_N"] + 0.03 * span["T2_N"] * signs,
+        "tau_in_Nm": exact["tau_in_Nm"] + 0.01 * span["tau_in_Nm"],
+    }
+    simulated = exact.with_channels({**exact.channels, **off}, exact.derived_from, "model")
+    assert model_runs.error_percent(simulated, exact) == pytest.approx(3.0)
+
+
+def of_loads(*rows):
+    """What is measured with each load in turn: lost motion and share of slack."""
+    measured = iter([({"lost_motion": lost, "width": 1.0, "slack_share": slack}, {}) for lost, slack in rows])
+    return lambda *_: next(measured)
+
+
+@pytest.mark.parametrize(
+    "rows, verdict",
+    [
+        ([(1.0, 0.0), (1.02, 0.0), (1.02, 50.0)], Verdict.YES),
+        ([(1.0, 0.0), (1.1, 0.0), (1.1, 50.0)], Verdict.NO),
+        ([(1.0, 0.0), (1.02, 0.0), (1.1, 50.0)], Verdict.PART),
+        ([(1.0, 50.0), (1.0, 50.0), (1.0, 50.0)], Verdict.OPEN),
+    ],
+    ids=["equal", "other with the load", "other when slack", "always slack"],
+)
+def test_the_deadband_over_loads_by_hand(monkeypatch, rows, verdict):
+    monkeypatch.setattr(model_alone, "measure", of_loads(*rows))
+    model = STUDY.model_copy(update={"load_stiffness_Nm_per_rad": [0.02, 0.05, 0.1]})
+    assert model_alone._load(CABLE, CLAIMS.model_copy(update={"model": model}), HOW).borne_out == verdict
+
+
+@pytest.mark.parametrize(
+    "lost, slopes, verdict",
+    [
+        ((1.0, 1.04), (1.0, 1.04), Verdict.NO),
+        ((1.0, 1.1), (1.0, 1.0), Verdict.YES),
+        ((1.0, 1.0), (1.0, 1.1), Verdict.YES),
+        ((1.0, 1.1), (1.0,), Verdict.OPEN),
+    ],
+)
+def test_the_place_of_the_loop_matters_if_lost_motion_or_slope_changes(monkeypatch, lost, slopes, verdict):
+    measured = [{"lost_motion": one} for one in lost]
+    for values, slope in zip(measured, slopes, strict=False):
+        values["slope"] = slope
+    monkeypatch.setattr(model_alone.model_runs, "loop_placements", lambda *_: dict(enumerate(measured)))
+    monkeypatch.setattr(model_alone, "measure", lambda values, *_: (values, {}))
+    assert model_alone._placement(CABLE, CLAIMS, HOW).borne_out == verdict
+
+
+@pytest.mark.parametrize(
+    "errors, verdict", [((1.0, 0.5), Verdict.YES), ((0.5, 1.1), Verdict.PART), ((1.1, 2.0), Verdict.NO)]
+)
+def test_the_papers_sections_are_enough_if_their_error_is_within_the_limit_of_one_percent(monkeypatch, errors, verdict):
+    update = {"sections": [8, 16], "sections_bend_rad": [np.pi, 2 * np.pi]}
+    settings = CLAIMS.model_copy(update={"model": STUDY.model_copy(update=update)})
+    # A bend after the other: 8 sections, of which nothing depends, and the paper's 16.
+    of_runs = iter([5.0, errors[0], 5.0, errors[1]])
+    monkeypatch.setattr(model_alone.model_runs, "run", lambda *_, **__: None)
+    monkeypatch.setattr(model_alone.model_runs, "error_percent", lambda *_: next(of_runs))
+    assert model_alone._sections(CABLE, settings).borne_out == verdict
+
+
+def test_loads_are_drawn_over_a_logarithmic_axis(found):
+    figure = model_figure(list(found.values()), {})
+    on_it = [ax for ax in figure.axes if "lost motion" in ax.get_ylabel() or "slack cable" in ax.get_ylabel()]
+    assert [ax.get_xscale() for ax in on_it] == ["log", "log"]

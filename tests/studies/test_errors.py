@@ -21,6 +21,28 @@ def test_error_is_rms_in_units_and_over_peak_to_peak():
     assert table["unit"].item() == "N m"
 
 
+def test_numbers_of_four_samples_by_hand():
+    """Simulated minus recorded is 5, -2, 0 and 1: its mean is 1, its median 0.5 and its mean square 30 / 4."""
+    read, errors = np.array([-5.0, 2.0, 3.0, 4.0]), np.array([5.0, -2.0, 0.0, 1.0])
+    measured = recording(0.03, theta_in_rad=lambda t: t, tau_in_Nm=lambda t: read)
+    model = measured.with_channels({"tau_in_Nm": read + errors}, {"tau_in_Nm": "model"}, "model")
+    (row,) = error_table([(measured, model)], "fitted").to_dict("records")
+    numbers = {name: value for name, value in row.items() if not isinstance(value, str)}
+    assert numbers == pytest.approx(
+        {
+            "bias": 1.0,
+            "rmse": np.sqrt(7.5),
+            "peak_to_peak": 9.0,
+            "maximum": 5.0,
+            "rms": np.sqrt(13.5),
+            "nrmse_percent": 100 * np.sqrt(7.5) / 9,
+            "window_from_s": 0.0,
+            "window_to_s": 0.03,
+            "samples": 4,
+        }
+    )
+
+
 def test_channels_not_recorded_or_prescribed_have_no_row():
     measured = recording(tau_in_Nm=np.sin, tau_out_Nm=np.sin)
     model = measured.with_channels(
@@ -45,10 +67,19 @@ def test_last_cycle_is_one_period_and_the_last_whole_one():
     assert 4.6 - end < 1.0
 
 
+def test_a_cycle_has_both_of_its_crossings():
+    """The drive crosses its middle 5 ms before the samples at 1.01 s, 2.01 s, 3.01 s and 4.01 s."""
+    r = recording(duration=4.6, theta_in_rad=lambda t: np.sin(2 * np.pi * (t - 0.005)))
+    assert r.time_s[last_cycle(r)] == pytest.approx(3.01 + 0.01 * np.arange(101))
+
+
 def test_dither_about_the_middle_makes_no_cycle():
-    dither = 0.01 * (-1.0) ** np.arange(461)
+    # More from sample to sample than the motion's 0.063, so that the middle is crossed several times in each cycle.
+    dither = 0.1 * (-1.0) ** np.arange(461)
     r = recording(duration=4.6, theta_in_rad=lambda t: np.sin(2 * np.pi * t) + dither[: t.size])
-    assert np.diff(r.time_s[last_cycle(r)][[0, -1]]) == pytest.approx(1.0, abs=0.03)
+    rising = np.flatnonzero((r["theta_in_rad"][:-1] < 0) & (r["theta_in_rad"][1:] >= 0))
+    assert rising.size >= 8
+    assert np.diff(r.time_s[last_cycle(r)][[0, -1]]) == pytest.approx(1.0, abs=0.011)
 
 
 def test_without_a_cycle_all_that_is_judged_is_the_window():

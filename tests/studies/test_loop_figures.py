@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import get_args
 
+import jinja2
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -106,6 +107,15 @@ def test_residuals_are_model_minus_recording_in_the_axis_unit(figure):
     assert next(iter(found.values())).lines[0].get_xdata()[[0, -1]] == pytest.approx([0, 1], abs=0.011)
 
 
+def test_the_line_of_a_residual_is_its_moving_mean():
+    """Over two samples, 2 % of a cycle of 101: of a residual that changes its sign with every sample, nothing."""
+    samples, mean = strips(draw([off_by(0.002 * (-1.0) ** np.arange(301))]))[
+        f"Δ {TABLE['tau_in_Nm'].tex} (mN·m)"
+    ].lines[:2]
+    assert np.abs(samples.get_ydata()) == pytest.approx(2.0)
+    assert np.abs(mean.get_ydata()).max() < 1e-9
+
+
 def test_a_channel_that_the_model_was_given_has_no_residual():
     assert set(strips(draw([pair(given=PRESCRIBED)]))) == {f"Δ {TABLE['tau_in_Nm'].tex} (mN·m)"}
     assert set(strips(draw([pair()], "drive-loops"))) == {f"Δ {TABLE['tau_in_Nm'].tex} (mN·m)"}
@@ -168,6 +178,7 @@ def test_a_prescribed_load_torque_is_said():
 def test_rows_of_panels_share_the_colours_of_conditions():
     pairs = [pair(pretension_N=T, id=f"{T}-{n}", frequency=n) for n in (1, 2) for T in (3.5, 7.0)]
     upper, lower = drawn_loops(draw(pairs, rows="frequency"))
+    assert [len(ax.lines) for ax in (upper, lower)] == [4, 4], "recording and model of the row's own two recordings"
     colours = [[line.get_color() for line in ax.lines] for ax in (upper, lower)]
     assert colours[0] == colours[1]
     assert len(set(colours[0])) == 2
@@ -208,3 +219,11 @@ def test_residuals_stand_below_their_loop():
         heights = [ax.get_position() for ax in (loop, *strips)]
         assert all(above.y0 > below.y1 for above, below in pairwise(heights))
         assert all(one.x0 == heights[0].x0 for one in heights)
+
+
+@pytest.mark.parametrize("batches, said", [(["first"], "batch first"), (["first", "later"], "batches first, later")])
+def test_the_caption_of_a_study_counts_its_batches(batches, said):
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("ccmodel", "."))
+    part = {"settings": {"title": "pretension", "batches": batches}, "name": "pretension", "parameters": "extended"}
+    text = environment.get_template("studies/loops/part.html.j2").render(parts=[part])
+    assert f"</strong>: {said}; model" in text and f"model, {said}" in text

@@ -74,14 +74,44 @@ def test_a_cable_that_is_slack_for_half_the_cycle_is_slack_for_half_the_cycle():
     assert measure(r, ["slack_share"], HOW)[0]["slack_share"] == pytest.approx(50.0, abs=1.0)
 
 
-def test_a_cable_is_slack_only_if_both_of_its_ends_are():
-    r = fine(T1_N=slack_at_times, T2_N=taut, T3_N=taut, T4_N=taut)
-    assert measure(r, ["slack_share"], HOW)[0]["slack_share"] == 0
+@pytest.mark.parametrize(("drive", "load", "share"), [(slack_at_times, taut, 0.0), (taut, slack_at_times, 50.0)])
+def test_a_cable_is_slack_by_the_tension_at_its_load_end_alone(drive, load, share):
+    r = fine(T1_N=drive, T2_N=load, T3_N=taut, T4_N=taut)
+    assert measure(r, ["slack_share"], HOW)[0]["slack_share"] == pytest.approx(share, abs=1.0)
+
+
+def test_phase_iv_takes_only_the_time_in_which_the_load_follows():
+    """A cable that is always slack, and a load that follows from 0.11 of a stroke of 0.2: asin(0.1) past the middle."""
+    flat = {"tau_in_Nm": lambda t: 0.1 * np.sin(2 * np.pi * t), "tau_out_Nm": lambda t: play(t, width=0.1)}
+    r = fine(T1_N=taut, T2_N=np.zeros_like, T3_N=taut, T4_N=taut, **flat)
+    values, _ = measure(r, ["IVa_share", "IVb_share"], HOW)
+    share = 100 * (np.pi / 2 - np.arcsin(0.1)) / np.pi
+    assert (values["IVa_share"], values["IVb_share"]) == pytest.approx((share, share), abs=1.0)
+
+
+def test_the_flat_part_ends_where_the_load_begins_to_follow_however_it_goes_on():
+    """After a reversal the output rests for 30 mN·m, has gradient 1 up to 35 % of its range, and then a quarter."""
+
+    def rise(moved):
+        return np.interp(moved, [0, 0.03, 0.05017, 0.2], [0, 0, 0.02017, 0.02017 + 0.25 * 0.14983])
+
+    def bent(t):
+        x, half = 0.1 * np.sin(2 * np.pi * t), rise(0.2) / 2
+        return np.where(np.cos(2 * np.pi * t) < 0, half - rise(0.1 - x), rise(x + 0.1) - half)
+
+    r = fine(tau_in_Nm=lambda t: 0.1 * np.sin(2 * np.pi * t), tau_out_Nm=bent)
+    assert measure(r, ["backlash"], HOW)[0]["backlash"] == pytest.approx(30.0, rel=0.03)
 
 
 def test_work_lost_is_the_area_of_the_drives_loop():
     r = fine(tau_in_Nm=lambda t: 0.1 * np.cos(2 * np.pi * t))
     assert measure(r, ["work_lost"], HOW)[0]["work_lost"] == pytest.approx(100 * np.pi, rel=0.005)
+
+
+def test_the_drives_loop_is_closed_where_its_ends_are_half_a_sample_apart():
+    r = fine(samples_a_cycle=40.5, tau_in_Nm=lambda t: 0.1 * np.cos(2 * np.pi * t))
+    polygon = 40.5 / 2 * np.sin(2 * np.pi / 40.5)
+    assert measure(r, ["work_lost"], HOW)[0]["work_lost"] == pytest.approx(100 * polygon, rel=0.005)
 
 
 def test_the_models_loop_is_that_of_its_closed_forms():

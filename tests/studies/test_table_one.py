@@ -1,5 +1,6 @@
 """The study of Table I: distances, made-up rigs and their refits, what is refused, and a tiny run of all of it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,11 @@ from ccmodel.channels import TABLE_ONE
 from ccmodel.cli import app
 from ccmodel.diagnosis.hypothesis import single_mechanisms
 from ccmodel.studies.table_one import rank
+from ccmodel.studies.table_one.cases import single_cases
 from ccmodel.studies.table_one.effects import Effect, all_effects, depends_on_time, finer, scaled
-from ccmodel.studies.table_one.refit import refit
+from ccmodel.studies.table_one.refit import NORMS, refit
 from ccmodel.studies.table_one.rigs import Condition, motion, plain, recorded, within_ranges
-from ccmodel.studies.table_one.settings import TableOne
+from ccmodel.studies.table_one.settings import Cable, TableOne
 from ccmodel.studies.table_one.study import run_study
 from ccmodel.typed import InputError, load_yaml_model
 
@@ -133,6 +135,8 @@ def test_the_drive_moves_a_whole_sine_in_the_judged_cycle():
 def test_conditions_beyond_the_sensors_ranges_are_told():
     assert within_ranges(STUDY.rig, HERE)
     assert not within_ranges(STUDY.rig, Condition("measured", 1.0, 1.0, 1.0))
+    # At rest a load cell reads twice the pretension of 7.3 N.
+    assert not within_ranges(STUDY.rig.model_copy(update={"load_cell_range_N": 14.0}), HERE)
 
 
 def test_free_cable_and_a_termination_that_gives_add_up():
@@ -158,6 +162,15 @@ def test_finer_strengths_lie_between_the_neighbours_on_the_grid():
         for effect in (group[0], group[-1]):
             own = [tuple(e.values.values()) for e in finer(effect, STUDY.grid)]
             assert len(own) == STUDY.grid.finer
+    compliance = [replace(DRIVE_END, values={"compliance": c}) for c in np.geomspace(2e-6, 225e-6, 6).tolist()]
+    for at, low, high in ((2, 1, 3), (0, -1, 1), (5, 4, 6)):  # the ends as if the grid went on
+        wanted = np.geomspace(2e-6, 225e-6, 6)[0] * (225 / 2) ** (np.linspace(low, high, 8)[1:-1] / 5)
+        assert [e.values["compliance"] for e in finer(compliance[at], STUDY.grid)] == pytest.approx(wanted)
+    for difference, low, high in ((0.2, 0.1, 0.3), (0.1, 0.05, 0.2), (-0.3, -0.2, -0.45), (0.05, 0.025, 0.1)):
+        own = finer(Effect("pretension", "set-up", {"difference": difference}, True), STUDY.grid)
+        assert [e.values["difference"] for e in own] == pytest.approx(np.geomspace(low, high, 8)[1:-1])
+    alone = STUDY.grid.model_copy(update={"set_up_differences": [-0.1, 0.1]})
+    assert finer(Effect("pretension", "set-up", {"difference": 0.1}, True), alone) == []
     ratio = Effect("cable-asymmetry", "cable", {"ratio": 1.0, "K_ratio": 0.9}, True)
     assert scaled(ratio, 2.0).values == pytest.approx({"ratio": 1.0, "K_ratio": 0.8})
 
@@ -230,3 +243,100 @@ def test_a_tiny_run_writes_tables_and_figure(tiny_file, tmp_path):
     assert set(ranked["by"]) <= {"errors", "errors and fit", "fit", "errors at the paper's fit"}
     assert set(ranked["norm"]) == {"peak-to-peak", "maximum", "rms"}
     assert {f"error_{c}" for c in TABLE_ONE} < set(ranked.columns)
+
+
+def test_the_grid_exceeds_the_plausible_range_at_both_ends():
+    (group,) = (
+        g for g in all_effects(STUDY.grid) if (g[0].name, g[0].place) == ("termination-compliance", "drive-end")
+    )
+    (parameter,) = registry.get("termination-compliance").strengths
+    sizes = [e.values["compliance"] for e in group]
+    assert (min(sizes), max(sizes)) == pytest.approx((parameter.low / 1.5, parameter.high * 1.5))
+    assert [e.plausible for e in group] == [False, True, True, True, True, False]
+
+
+def test_an_error_of_the_set_up_is_a_rig_with_that_value():
+    tight = STUDY.rig.model_copy(update={"pretension_N": 1.1 * 7.3})
+    stiff = replace(HERE, load_stiffness_Nm_per_rad=1.1 * 0.05)
+    for name, rig, condition in (("pretension", tight, HERE), ("load-stiffness", STUDY.rig, stiff)):
+        off = recorded(STUDY.rig, HERE, [Effect(name, "set-up", {"difference": 0.1}, True)])
+        np.testing.assert_allclose(off, recorded(rig, condition, []), rtol=1e-12)
+        assert np.abs(off - recorded(STUDY.rig, HERE, [])).max() > 0.01
+
+
+def test_the_torques_are_those_of_the_difference_of_the_cables():
+    _, tau_in, tau_out, T1, T2, T3, T4 = plain(STUDY.rig, HERE, 13880.0, 0.147)
+    np.testing.assert_allclose(0.006 * np.array([T1 - T3, T2 - T4]), [tau_in, tau_out], atol=1e-12)
+
+
+def test_norms_and_errors_of_a_fit_by_hand():
+    values = np.array([[-3.0, 1.0, 1.0, 1.0], [2.0, 2.0, 2.0, 2.0]])
+    wanted = {"peak-to-peak": (4.0, 0.0), "maximum": (3.0, 2.0), "rms": (np.sqrt(3), 2.0)}
+    assert {name: tuple(norm(values)) for name, norm in NORMS.items()} == {
+        name: pytest.approx(both) for name, both in wanted.items()
+    }
+    made_up, cable = recorded(STUDY.rig, HERE, [DRIVE_END]), STUDY.rig.measured
+    found = refit(STUDY.rig, HERE, made_up)
+    k, mu = found.stiffness_ratio * cable.stiffness_N_per_m, found.friction_ratio * cable.friction_coefficient
+    rmse = np.sqrt(((plain(STUDY.rig, HERE, k, mu) - made_up) ** 2).mean(axis=1))
+    assert found.rmse == pytest.approx(rmse, rel=1e-6)
+
+
+def test_frequencies_are_varied_for_effects_that_depend_on_time_alone():
+    frequencies = [replace(HERE, frequency_Hz=f) for f in (0.1, 1.0)]
+    for group in single_cases(STUDY, frequencies):
+        tried = {condition.frequency_Hz for condition, _ in group}
+        assert tried == ({0.1, 1.0} if depends_on_time(group[0][1]) else {0.1}), group[0][1]
+
+
+def scored_by_hand():
+    """Noise of 3 in angle and torques and of 2.5 in tensions, errors of 4 and 6 in them, and wanted errors less by e.
+
+    The fits are ln 2 + 0.1 and ln 2 + 0.2 above rigs with the measured cable, whose fitted values are twice as large,
+    and exact on a rig with the fitted cable; the last case failed.
+    """
+    sensors = {"encoder_step_rad": 3 * np.sqrt(12), "torque_accuracy_Nm": 3.0, "load_cell_accuracy_N": 4.0}
+    cables = {"measured": Cable(stiffness_N_per_m=1000.0, friction_coefficient=0.1)}
+    cables["fitted"] = Cable(stiffness_N_per_m=2000.0, friction_coefficient=0.2)
+    rig = STUDY.rig.model_copy(update=sensors | cables | {"pulley_radius_m": 1.0})
+    pattern = dict(zip(TABLE_ONE, [5 / np.e] * 3 + [6.5 / np.e] * 4, strict=True))
+    study = STUDY.model_copy(update={"rig": rig, "pattern_percent": pattern, "rounding_percent": 4.5})
+    errors = {f"rmse_{c}": e for c, e in zip(TABLE_ONE, [4.0] * 3 + [6.0] * 4, strict=True)}
+    sizes = {
+        f"{norm}_{c}": size for norm, size in (("maximum", 100), ("rms", 50), ("peak-to-peak", 10)) for c in TABLE_ONE
+    }
+    ratios = [2 * np.exp(0.1), 2 * np.exp(0.2), 1.0, 1.0]
+    table = pd.DataFrame({"rig": ["measured", "measured-free", "fitted", "measured"], "failed": ["", "", "", "why"]})
+    return study, rank.scored(table.assign(stiffness_ratio=ratios, friction_ratio=ratios, **errors, **sizes), study)
+
+
+def test_the_scores_of_a_case_by_hand():
+    study, found = scored_by_hand()
+    assert rank.sensor_noise(study.rig) == pytest.approx([3.0] * 3 + [2.5] * 4)
+    assert found.index.tolist() == [0, 1, 2]
+    assert found["fit"].tolist() == pytest.approx([0.1, 0.2, np.nan], nan_ok=True)
+    assert found["noisy_maximum"].tolist() == pytest.approx([1.0] * 3)
+    assert found["noisy_rms"].tolist() == pytest.approx([1 + np.log(2)] * 3)
+    assert found["noisy_peak-to-peak"].tolist() == pytest.approx([1 + np.log(10)] * 3)
+    # Without noise the error of 4 % counts as the 4.5 % of the rounding.
+    bare = np.sqrt((3 * (1 + np.log(4.5 / 5)) ** 2 + 4 * (1 + np.log(6 / 6.5)) ** 2) / 7)
+    assert found["bare_maximum"].tolist() == pytest.approx([bare] * 3)
+    both = [np.sqrt((7 + 2 * fit**2) / 9) for fit in (0.1, 0.2, 0.0)]
+    assert found["both_maximum"].tolist() == pytest.approx(both)
+    assert found["held_maximum"].tolist() == pytest.approx([1.0, np.nan, np.nan], nan_ok=True)
+
+
+def test_the_nearest_plausible_case_stands_for_an_effect():
+    table = pd.DataFrame({"effect": list("aabbcc"), "plausible": [True, False, True, True, True, True]})
+    table["d"] = [4.0, 1.0, np.nan, 3.0, 5.0, 5.0]
+    assert rank.nearest(table, "d").index.tolist() == [3, 0, 4]
+
+
+def test_the_room_for_the_torque_by_hand():
+    """With tensions of 1 N and torques of 12 and 6 mN·m over a radius of 6 mm: half the sum of both errors, and all."""
+    table = pd.DataFrame({f"{norm}_{c}": [1.0] * 3 for norm in NORMS for c in ("T1_N", "T3_N")})
+    table = table.assign(
+        plausible=[True, True, False], **{f"{norm}_tau_in_Nm": [0.012, 0.006, 0.001] for norm in NORMS}
+    )
+    wanted = pytest.approx({"least": (12.8 + 9.9) / 2, "most": 12.8 + 9.9})
+    assert rank.room_for_torque(table, STUDY) == dict.fromkeys(NORMS, wanted)

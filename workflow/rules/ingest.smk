@@ -18,7 +18,7 @@ rule ingest:
         runtime=10,
     params:
         folder=lambda wildcards: str(RAW / wildcards.batch),
-        # A file that takes the place of another may have an older date, which Snakemake does not notice.
+        # As `content_of`, of all files of the folder.
         content=lambda wildcards: folder_digest(RAW / wildcards.batch),
         sources=source_digest("ccmodel.steps.ingest"),
     message:

@@ -26,13 +26,16 @@ rule tabulate_errors:
         "../scripts/tabulate_errors.py"
 
 
+FINDINGS = [str(file) for file in [RAW / "findings.json"] if file.exists()]
+
+
 rule write_report:
     input:
         errors=f"{RESULTS}/tables/errors.parquet",
         fits=sorted({fit_of(p, batch) for p, batch in runs() if p in CONFIG.fits}),
         summaries=[summary_of(batch) for batch in BATCHES],
         # What an import of all batches has left out.
-        findings=[str(file) for file in [RAW / "findings.json"] if file.exists()],
+        findings=FINDINGS,
         simulations=[
             simulated_of(p, batch).removesuffix(".nc") + ".json" for p, batch in runs()
         ],
@@ -63,6 +66,7 @@ rule write_report:
         raw=CONFIG.raw,
         parameters=[parameters for parameters, _ in runs()],
         unusable=UNUSABLE,
+        content=content_of([*FINDINGS, *filter(None, [CONFIG.concealed])]),
         studies=[
             {
                 "kind": study.kind,

@@ -48,6 +48,8 @@ for name, study in STUDIES.items():
             measuring=CONFIG.measuring.model_dump_json(),
             labels=[label for label, _, _ in needs],
             fits=fits,
+            content=content_of(study.files),
+            state=study.state,
             sources=source_digest(f"ccmodel.studies.{study.kind}.study"),
         message:
             f"Making study {name}"

@@ -59,16 +59,28 @@ def read_baseline(file: Path) -> Baseline:
         raise InputError(f"{file}: {where}: {first['msg']}; restore it, or accept a new one: {ACCEPT}") from None
 
 
-def make_baseline(batches: Batches, limits: Limits, date: str, commit: str, reason: str) -> Baseline:
-    """Accept the accuracy of a run."""
+def versions() -> dict[str, str]:
+    """Versions of the package, of Python and of the libraries that decide numbers."""
+    return {"ccmodel": __version__, "python": platform.python_version()} | {n: version(n) for n in LIBRARIES}
+
+
+def make_baseline(
+    batches: Batches, limits: Limits, date: str, commit: str, reason: str, measured_with: dict[str, str] | None = None
+) -> Baseline:
+    """Accept the accuracy of a run; `measured_with` are its `versions`, without it the present ones."""
     batches = {name: batch.model_copy(deep=True) for name, batch in sorted(batches.items())}
     for batch, parameters, channel, accepted in intervals(batches, limits):
         rounded = {name: [None if v is None else float(f"{v:.3g}") for v in row] for name, row in accepted.items()}
         channels = batches[batch].sets[parameters].channels
         channels[channel] = channels[channel].model_copy(update={"accepted": rounded})
-    versions = {"ccmodel": __version__, "python": platform.python_version()} | {n: version(n) for n in LIBRARIES}
     return Baseline(
-        format=FORMAT, date=date, commit=commit, reason=reason, versions=versions, limits=limits, batches=batches
+        format=FORMAT,
+        date=date,
+        commit=commit,
+        reason=reason,
+        versions=measured_with or versions(),
+        limits=limits,
+        batches=batches,
     )
 
 

@@ -7,14 +7,13 @@ from pathlib import Path, PurePath
 
 from pydantic import BaseModel
 
-from ccmodel.accuracy.baseline import ACCEPT, make_baseline, read_baseline, write_baseline
+from ccmodel.accuracy.baseline import ACCEPT, make_baseline, read_baseline, versions, write_baseline
 from ccmodel.accuracy.comparison import GAINED, Comparison, Limits, compare
 from ccmodel.accuracy.history import add_rows, commits_in, head, now, rows_of, run_commit
 from ccmodel.accuracy.measure import Batches
 from ccmodel.progress import Progress, each_of
 from ccmodel.provenance import file_digest
 from ccmodel.typed import InputError, load_json_model
-from ccmodel.version import __version__
 
 # The study's file in a folder of results.
 STATE = "tables/baseline.json"
@@ -32,12 +31,13 @@ class _Inputs(BaseModel):
 
 
 class _Measured(BaseModel):
-    """What is read of the study's file; one of before does not state its commit."""
+    """What is read of the study's file; one of before does not state its commit or versions."""
 
     settings: _Settings
     measured: Batches
     commit: str | None = None
     date: str | None = None
+    versions: dict[str, str] = {}
     provenance: _Inputs = _Inputs()
 
 
@@ -52,6 +52,8 @@ class State:
     batches : dict of str to BatchAccuracy
     commit, date : str
         Commit whose sources were measured, and its date; the present date, if there were changes.
+    versions : dict of str to str
+        Versions of the package and libraries with which it was measured.
     """
 
     baseline: Path
@@ -60,6 +62,7 @@ class State:
     batches: Batches
     commit: str
     date: str
+    versions: dict[str, str]
 
 
 def state_of(results: Path) -> State:
@@ -83,7 +86,7 @@ def state_of(results: Path) -> State:
     limits = Limits(coverage=stated.settings.coverage, reproducibility=stated.settings.reproducibility)
     commit, date = head(folder) if stated.commit is None else (stated.commit, stated.date)
     baseline, history = folder / stated.settings.file, folder / stated.settings.history
-    return State(baseline, history, limits, stated.measured, commit, date or now())
+    return State(baseline, history, limits, stated.measured, commit, date or now(), stated.versions or versions())
 
 
 def _results_of(inputs: Iterable[str]) -> PurePath:
@@ -144,9 +147,9 @@ def accept(results: Path, reason: str) -> State:
     state = state_of(results)
     if not state.batches:
         raise InputError(f"{results}: the run has measured no batch; there is nothing to accept")
-    baseline = make_baseline(state.batches, state.limits, state.date, state.commit, reason.strip())
+    baseline = make_baseline(state.batches, state.limits, state.date, state.commit, reason.strip(), state.versions)
     # The history first: if the baseline fails, the same command replaces this commit's rows.
-    add_rows(state.history, rows_of(state.batches, state.commit, state.date, __version__))
+    add_rows(state.history, rows_of(state.batches, state.commit, state.date, state.versions["ccmodel"]))
     write_baseline(state.baseline, baseline)
     return state
 

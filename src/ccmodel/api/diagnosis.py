@@ -90,11 +90,11 @@ class Diagnosis:
         return self._outcome.models.get("nearest")
 
     def to_frame(self) -> pd.DataFrame:
-        """Candidate models, a row each: the calibrated model, and then those with the smallest mean square first.
+        """Candidate models that were compared to the end, a row each: the calibrated one, then by mean square.
 
-        Columns ``mean_square`` (of the leave-one-out residuals over their noise; 1 is noise), ``lack_of_fit`` (most
-        probable mean square of what the candidate leaves as a function of the rig's state), ``probability`` (that it is
-        all that is missing) and ``why`` it was selected or not.
+        Columns ``mean_square`` (of the leave-one-out residuals over their noise; 1 is noise), ``lack_of_fit`` (least
+        mean square of a model discrepancy whose evidence is within a factor of 20 of the best), ``probability`` (that
+        it is all that is missing) and ``why`` it was selected or not.
         """
         rows = [] if self._outcome.found is None else candidates_of(self._outcome.found)
         columns = ["candidate", "mean_square", "lack_of_fit", "probability", "why"]

@@ -137,7 +137,7 @@ def errors(table: pd.DataFrame, batch: Batch, verdict: str) -> Figure:
     """Held-out errors by channel over the noise floor: a bar for each model."""
     models = {"before": "calibrated model"}
     if "after" in table:
-        models["after"] = "best model"
+        models["after"] = "extended model"
     if "nearest" in table:
         models["nearest"] = f"nearest model, {NOT_ACCEPTED}"
     colours = {"before": COLOURS[0], "after": COLOURS[1], "nearest": COLOURS[3]}
@@ -147,7 +147,9 @@ def errors(table: pd.DataFrame, batch: Batch, verdict: str) -> Figure:
         ratios = table[column] / table["noise"]
         at = np.arange(len(table)) + (k - (len(models) - 1) / 2) * height
         bars = ax.barh(at, ratios, 0.9 * height, color=colours[column], label=label)
-        ax.bar_label(bars, [f"{ratio:.1f}" for ratio in ratios], padding=3, fontsize=8)
+        # The white box keeps the line of the noise floor off the number.
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+        ax.bar_label(bars, [f"{ratio:.1f}" for ratio in ratios], padding=3, fontsize=8, bbox=box)
     ax.axvline(1.0, color="black", lw=1.0, ls="--", label="noise floor")
     ax.set_yticks(range(len(table)), [SYMBOL[channel] for channel in table.index])
     ax.invert_yaxis()

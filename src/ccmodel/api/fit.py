@@ -96,8 +96,8 @@ class Fit:
         if self.mean_square > GOOD_FIT:
             found.append(
                 f"the model does not reproduce the recordings (mean square {self.mean_square:.3g}, 1 is noise): its"
-                " values depend on how its errors are weighted, which no interval contains; diagnose() finds what is"
-                " missing"
+                " values depend on the weights of the residuals, and the intervals do not include this;"
+                " 'ccmodel diagnose' looks for what is missing"
             )
         wrong = contradicted_by_fit(self.model.parameters.stiffness_N_per_m, self.batch._file)
         found += [f"{finding.place}: {finding.text}" for finding in wrong]

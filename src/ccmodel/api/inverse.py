@@ -294,8 +294,9 @@ class Compensation:
     def __repr__(self) -> str:
         before, after = 1e3 * self.straight_lost_motion_rad, 1e3 * self.lost_motion_rad
         return (
-            f"Motion of the drive, {counted(len(self.table), 'sample')}: lost motion {after:.3g} mrad by the model,"
-            f" {before:.3g} mrad without it; at most {self.largest_speed_rad_per_s:.3g} rad/s"
+            f"Motion of the drive, {counted(len(self.table), 'sample')}: rms error of the load's angle, by the model:"
+            f" {after:.3g} mrad; {before:.3g} mrad if the drive makes the wanted motion itself; drive speed up to"
+            f" {self.largest_speed_rad_per_s:.3g} rad/s"
         )
 
 

@@ -21,13 +21,6 @@ FEWEST_SAMPLES = 20
 Tolerance = float | Mapping[str, float]
 # Candidates that are fitted whatever the screening says: one, or several, each of them one to four mechanisms together.
 Candidates = str | Sequence[str | Sequence[str]]
-# Name of an option on the command line, where it has another one.
-_ON_COMMAND_LINE = {
-    "step_s": "step",
-    "candidates": "candidate",
-    "run_limit": "run-limit",
-    "time_limit_s": "time-limit",
-}
 
 
 def diagnosis_options(
@@ -38,11 +31,10 @@ def diagnosis_options(
     without: str | Collection[str] = (),
     freeze: bool = False,
     has_baseline: bool = False,
-    prefix: str = "",
     run_limit: int | None = None,
     time_limit_s: float | None = None,
 ) -> Options:
-    """Checked options of a diagnosis; `prefix` as of `settings_of`.
+    """Checked options of a diagnosis.
 
     Raises
     ------
@@ -50,9 +42,9 @@ def diagnosis_options(
         A line for each option that cannot be used.
     """
     names = (without,) if isinstance(without, str) else tuple(without)
-    stated = settings_of(tolerance, step_s, cycles, candidates, prefix, run_limit, time_limit_s)
+    stated = settings_of(tolerance, step_s, cycles, candidates, run_limit, time_limit_s)
     options = options_of(stated, names, freeze)
-    check_options(options, has_baseline, prefix)
+    check_options(options, has_baseline)
     return options
 
 
@@ -61,7 +53,6 @@ def settings_of(
     step_s: float | None = None,
     cycles: int | None = None,
     candidates: Candidates = (),
-    prefix: str = "",
     run_limit: int | None = None,
     time_limit_s: float | None = None,
 ) -> Diagnosing:
@@ -69,12 +60,7 @@ def settings_of(
 
     Parameters
     ----------
-    tolerance, step_s, cycles, candidates
-        As of `ccmodel.diagnose`.
-    prefix : str
-        What stands before the names of options in messages, "--" on the command line.
-    run_limit : int, optional
-    time_limit_s : float, optional
+    tolerance, step_s, cycles, candidates, run_limit, time_limit_s
         As of `ccmodel.diagnose`.
 
     Raises
@@ -90,7 +76,7 @@ def settings_of(
     if isinstance(tolerance, Mapping):
         if unknown := [repr(name) for name in tolerance if name not in MEASURED]:
             text = f"a channel is one of {', '.join(MEASURED)}; got {', '.join(unknown)}"
-            raise InputError(f"{prefix}tolerance: {text}")
+            raise InputError(f"tolerance: {text}")
         stated["tolerance"] = dict(tolerance)
     elif tolerance is not None:
         stated["tolerance"] = tolerance
@@ -99,7 +85,7 @@ def settings_of(
     except ValidationError as error:
         # A tolerance is a number or a mapping; the error on the form that was not used is of no interest.
         wrong = [e for e in error.errors() if e["type"] not in ("float_type", "dict_type")] or error.errors()[:1]
-        raise InputError("\n".join(_line(one, prefix) for one in wrong)) from None
+        raise InputError("\n".join(map(_line, wrong))) from None
 
 
 def _together(candidate: str) -> list[str]:
@@ -107,10 +93,9 @@ def _together(candidate: str) -> list[str]:
     return [one.strip() for one in candidate.split(",")]
 
 
-def _line(error: Mapping[str, Any], prefix: str) -> str:
+def _line(error: Mapping[str, Any]) -> str:
     name = str(error["loc"][0]) if error["loc"] else "candidates"
-    shown_name = _ON_COMMAND_LINE.get(name, name) if prefix else name
-    return f"{prefix}{shown_name}: {error['msg'].removeprefix('Value error, ').removeprefix('forced_candidates: ')}"
+    return f"{name}: {error['msg'].removeprefix('Value error, ').removeprefix('forced_candidates: ')}"
 
 
 def check_step(recordings: Sequence[Recording], step_s: float | None) -> None:

@@ -1,5 +1,6 @@
 """Diagnosis of a batch, or of several batches of one rig."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from shlex import quote
 from typing import Annotated
@@ -98,28 +99,15 @@ def diagnose(
     Exits with 0 at any verdict, unless --strict is given, or --keep-law and no law was learned.
     """
     import ccmodel
-    from ccmodel.api.options import diagnosis_options
     from ccmodel.diagnosis.kept_law import check_name
     from ccmodel.paths import try_folder
     from ccmodel.studies.diagnosis.run import FILES
 
     output, shares = Output(as_json, quiet), tolerance_of(tolerance)
-    # The same checks as below, with the names that options have here.
-    diagnosis_options(
-        shares,
-        step,
-        cycles,
-        candidate,
-        without,
-        freeze,
-        baseline is not None,
-        prefix="--",
-        run_limit=run_limit,
-        time_limit_s=time_limit,
-    )
+    # The same check as below, with the name that the option has here.
     try_folder(out, "--out", FILES, () if baseline is None else (baseline,))
     if keep_law is not None:
-        check_name(keep_law, prefix="--")
+        check_name(keep_law)
     with leaving(out), output.progress() as progress:
         found = ccmodel.diagnose(
             batches,
@@ -141,6 +129,8 @@ def diagnose(
     for finding in found.batch.findings:
         if finding.is_refused:
             output.finding(str(finding), "refused")
+    for line in _not_judged(found.report):
+        output.finding(line, "warning")
     output.hint(f"wrote {out}: diagnosis.json, report.html and the models. Next: ccmodel report {quote(str(out))}")
     if kept is not None:
         output.hint(f"wrote {kept}: the law as a mechanism, to be reviewed (docs/how-to/add-a-mechanism.md)")
@@ -148,3 +138,24 @@ def diagnose(
         output.message(f"--keep-law {keep_law}: no law was learned (verdict '{found.verdict}'); no file is written")
     if (strict and found.verdict != "agrees") or (keep_law is not None and kept is None):
         raise typer.Exit(1)
+
+
+def _not_judged(report: Mapping) -> list[str]:
+    """Lines on what was not judged, and on what gives a search more room; refused files have lines of their own."""
+    from ccmodel.report.verdict import CANDIDATES_LEFT, INPUTS_INCONSISTENT, PLACE_LEFT
+
+    if report["verdict"] == INPUTS_INCONSISTENT:  # the verdict states them
+        return []
+    lines = []
+    for one in report.get("not_judged", ()):
+        more = f"; {_remedy(one['why'])}" if one["what"] in (CANDIDATES_LEFT, PLACE_LEFT) else ""
+        if not one.get("refused"):
+            lines.append(f"not judged: {one['what']}: {one['why']}{more}")
+    return lines
+
+
+def _remedy(why: str) -> str:
+    """What to do about a limit, by the reason that names it."""
+    options = {"model runs": "a higher --run-limit", "time limit": "a higher --time-limit, such as 900"}
+    named = [option for words, option in options.items() if words in why]
+    return f"repeat with {' or '.join(named or options.values())}"

@@ -38,9 +38,11 @@ INTERRUPTED = "nothing was written"
 PROGRAM_ERROR, CLOSED_PIPE = 70, 128 + signal.SIGPIPE
 # Errors of writing. One of a file has its name, so that one without a name is of standard output.
 _OF_WRITING = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF}
-# Arguments of the Python interface that are options of another name here.
+# Arguments of the Python interface whose options have other words here. No other text has these names.
 _OPTION_OF = {
     "step_s": "--step",
+    "run_limit": "--run-limit",
+    "time_limit_s": "--time-limit",
     "pretension_N": "--pretension",
     "max_speed_rad_per_s": "--max-speed",
     "max_acceleration_rad_per_s2": "--max-acceleration",
@@ -147,11 +149,18 @@ def _lines_on(error: Exception) -> list[str]:
 
 
 def _with_options(line: str) -> str:
-    """A line, in which an argument that it is on has the name of the option."""
-    if line.partition(":")[0] in _OPTION_OF:
-        for name, option in _OPTION_OF.items():
-            line = line.replace(name, option)
-    return line
+    """A line, in which an argument that it is on has the name of the option.
+
+    A line may begin with the name of a file instead. It is on an option only if that option was typed.
+    """
+    name, colon, text = line.partition(":")
+    option = {**_OPTION_OF, "candidates": "--candidate"}.get(name, f"--{name}")
+    typed = (word.partition("=")[0] for word in sys.argv[1:])
+    if option not in {Commands.renamed.get(word, word) for word in typed}:
+        return line
+    for other, its_option in _OPTION_OF.items():
+        text = text.replace(other, its_option)
+    return f"{option}{colon}{text}"
 
 
 def _text_of(error: Any) -> str:

@@ -52,12 +52,12 @@ def fit(
     """
     import ccmodel
     from ccmodel.api.batch import check_consistent
-    from ccmodel.api.options import diagnosis_options
+    from ccmodel.api.options import settings_of
     from ccmodel.studies.diagnosis.run import INGEST
 
     output, shares = Output(as_json, quiet), tolerance_of(tolerance)
-    # The same check as below, with the names that options have here.
-    diagnosis_options(shares, step, cycles, prefix="--")
+    # The same check as below, before the batch is read.
+    settings_of(shares, step, cycles)
     with leaving(out), output.progress() as progress:
         loaded = ccmodel.load(batch, progress=within(progress, 0.0, INGEST))
         check_consistent(loaded, trust_inputs, "--trust-inputs")

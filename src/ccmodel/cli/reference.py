@@ -56,7 +56,7 @@ unit is a value beside it (`unit`). A value that there is not is `null`. `out` i
 | `simulate` | `out`, `recording`, `samples`, `pretension_N` |
 | `predict` | `out`; `errors`: a list with a row for each recording and channel, as in the table of errors of a run; `findings`, `notes`, `left_out` |
 | `estimate` | `out`; `errors`: a list with a row for each recording and load sensor: `recording`, `channel`, `unit`, `bias`, `rms`, `share_within` (of the 90 % interval), `samples`; `visible_share`: by recording; `notes`, `left_out` |
-| `compensate` | `out`, `samples`, `lost_motion_rad`, `straight_lost_motion_rad`, `largest_speed_rad_per_s`, `notes` |
+| `compensate` | `out`, `samples`; root mean square error of the load's angle by the model: `lost_motion_rad` with this motion of the drive, `straight_lost_motion_rad` if the drive makes the wanted motion itself; `largest_speed_rad_per_s` of the drive, `notes` |
 | `diagnose` | [diagnosis.json](diagnosis-files.md): `format`, `batch`, `batches` (of several), `verdict`, `is_held`, `location`, `mechanisms`, `laws`, `alternatives`, `likeliest`, `nearest`, `fit`, `repeatability`, `next_experiment`, `not_judged`, `headline`, `provenance`; `out` |
 | `check` of `accuracy` | `summary`, `lost`, `gained`, `not_compared` |
 | `accept` of `accuracy` | `baseline`, `history`, `batches` |

@@ -23,11 +23,18 @@ from math import comb, exp, log
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.discrepancy import Discrepancy, Evidence, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis, laws_in
-from ccmodel.diagnosis.repeatability import FRICTION, friction_p_values, log_bayes_factor
+from ccmodel.diagnosis.repeatability import (
+    FRICTION,
+    OWN_FRICTION,
+    friction_p_values,
+    log_bayes_factor,
+    scatter_p_value,
+)
 from ccmodel.diagnosis.whitening import Whitened
 
 # Beyond it, an exponential function is infinite.
@@ -126,7 +133,7 @@ class Comparison:
         """
         found = []
         for candidate in [self.base, *self.candidates]:
-            evidence, repeats = self.evidence[candidate.hypothesis], log_bayes_factor_of_repeats(candidate)
+            evidence, repeats = self.evidence[candidate.hypothesis], self.log_repeats[candidate.hypothesis]
             priors = log_priors(candidate.hypothesis.size, self._alike)
             # What no list holds is any law of any slot.
             unlisted = log((1 - settings.PRIOR_LISTED) / settings.PRIOR_LISTED)
@@ -135,7 +142,13 @@ class Comparison:
             if candidate is not self.base:
                 by_law = log(settings.SAME_LAW), log(1 - settings.SAME_LAW)
                 complete = float(np.logaddexp(evidence.exact + by_law[0], evidence.other_law + by_law[1]))
-            weights = np.array([complete, evidence.incomplete]) + priors + repeats
+            # What an effect does to friction alone, which each recording has of its own, leaves no residuals. A trend is
+            # that of a listed mechanism.
+            with np.errstate(divide="ignore"):
+                share = -settings.IN_FRICTION * np.expm1(log_factor_of_scatter(candidate))
+                in_friction = complete + np.log(share)
+            incomplete = np.logaddexp(evidence.incomplete + repeats, in_friction)
+            weights = np.array([complete + repeats, incomplete]) + priors
             is_possible = candidate is self.base or candidate.is_plausible
             found.append(weights if is_possible else np.full(2, -np.inf))
         return np.array(found)
@@ -197,21 +210,42 @@ class Comparison:
         """
         further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
         share, smallest = self._left(candidate, part)
+        if any(registry.get(name).drift == OWN_FRICTION for name, _ in further):
+            share = max(share, self._friction_left(candidate, part))
         if larger is not None and (without := self._without(larger, further)) is not None:
             share, smallest = min((share, smallest), self._left(larger, without))
         support = min(candidate.log_support(*one) for one in further)
         is_law = bool(laws_in(Hypothesis(tuple(further))))
         # Where a mechanism visibly leaves something and no law does better, what is missing may be no law at all.
         laws_tried = part.hypothesis in self.laws_beside and share <= smallest
-        prior = priors_of_further(part is not self.base, is_law, laws_tried)
+        has_part = part is not self.base
+        found = imitation(share, smallest, priors_of_further(has_part, is_law, laws_tried))
+        # That no law fits better does not support a strength that differs from recording to recording.
         with np.errstate(divide="ignore"):
-            return np.log(limited(imitation(share, smallest, prior), prior[0], support))
+            return np.log(limited(found, priors_of_further(has_part, is_law)[0], support))
 
     def _left(self, candidate: CandidateFit, part: CandidateFit) -> tuple[float, float]:
         """Share of a part's lack of fit that a candidate leaves, and the least share that would be noticed."""
         before = max(self.unexplained_mean_square(part), self.evidence[part.hypothesis].resolution, 1e-12)
         resolution = self.evidence[candidate.hypothesis].resolution
         return min(self.unexplained_mean_square(candidate) / before, 1.0), min(resolution / before, 1.0)
+
+    def _friction_left(self, candidate: CandidateFit, part: CandidateFit) -> float:
+        """Share of how friction differs from recording to recording that a candidate with a drift leaves to its part.
+
+        It is measured by the logarithm of the Bayes factor, which residuals do not show.
+        """
+        after, before = (self.log_repeats[c.hypothesis] for c in (candidate, part))
+        return min(after / before, 1.0) if before < 0.0 else 0.0
+
+    @cached_property
+    def log_repeats(self) -> dict[Hypothesis, float]:
+        """`log_bayes_factor_of_repeats` of the base and of each candidate."""
+        return {c.hypothesis: log_bayes_factor_of_repeats(c) for c in [self.base, *self.candidates]}
+
+    def is_good(self, candidate: CandidateFit) -> bool:
+        """Whether a candidate's fit is good, and friction differs between recordings as from run to run."""
+        return candidate.is_good and self.log_repeats[candidate.hypothesis] > settings.FRICTION_SCATTERS
 
     def _without(self, candidate: CandidateFit, members: set[tuple[str, str]]) -> CandidateFit | None:
         """The fitted candidate of the same mechanisms but for some; None if they were not fitted."""
@@ -306,7 +340,7 @@ class Comparison:
         Anything else that is missing is then of no consequence. Of several such candidates, it is the most probable one
         that is plausible. None if the calibrated model's own fit is good, since a good fit then shows nothing.
         """
-        if self.base.is_good:
+        if self.is_good(self.base):
             return None
         most = Counter[str]()
         for c in self.candidates:
@@ -314,7 +348,7 @@ class Comparison:
         every = ((name, places) for name, count in most.items() for places in range(1, count + 1))
         identified = sorted(name for name, places in every if self.confidence_in(name, places) >= settings.DECIDED)
         alone = (c for c in self.leading if identified and list(c.hypothesis.names) == identified)
-        return next((c for c in alone if c.is_plausible and c.is_good), None)
+        return next((c for c in alone if c.is_plausible and self.is_good(c)), None)
 
     @property
     def best_of_list(self) -> CandidateFit | None:
@@ -324,9 +358,9 @@ class Comparison:
         probability above one half. None if the calibrated model's own fit is good.
         """
         best = self.most_probable
-        if self.base.is_good or best is self.base or best.hypothesis.size < 2:
+        if self.is_good(self.base) or best is self.base or best.hypothesis.size < 2:
             return None
-        if not best.is_good or laws_in(best.hypothesis):
+        if not self.is_good(best) or laws_in(best.hypothesis):
             return None
         names, complete = best.hypothesis.names, np.array(self.probability)
         same = np.array([c.hypothesis.names == names for c in self.candidates])
@@ -488,6 +522,11 @@ def log_bayes_factor_of_repeats(candidate: CandidateFit) -> float:
     """
     tests = friction_p_values(candidate.whitened, candidate.residuals, FRICTION in candidate.values)
     return sum(map(log_bayes_factor, tests))
+
+
+def log_factor_of_scatter(candidate: CandidateFit) -> float:
+    """The same that friction differs from run to run about its trend."""
+    return log_bayes_factor(scatter_p_value(candidate.whitened, candidate.residuals, FRICTION in candidate.values))
 
 
 def _rank(candidate: CandidateFit) -> tuple[bool, float]:

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from ccmodel.diagnosis.whitening import Whitened
 
 FRICTION, PRETENSION = "friction_coefficient", "pretension_scale"
+# Parameter that is the friction of a single recording over the rig's.
+OWN_FRICTION = "friction_scale"
 _WORDS = {FRICTION: "friction", PRETENSION: "initial tension"}
 _CHANNEL_OF = {zero: channel for channel, zero in ZERO_OF.items()}
 
@@ -212,13 +214,29 @@ def friction_p_values(
     is_fitted : bool
         Whether the fit determines the mean friction; otherwise deviations count from the model's friction.
     """
-    # A tolerance accepts discrepancies, and friction takes up some of them.
-    if len(residuals) < settings.FEWEST_FOR_SCATTER or any(w.observations.tolerance.any() for w in whitened):
+    if _is_not_tested(whitened):
         return 1.0, 1.0
     found = deviations(whitened, residuals, FRICTION)
+    return _scatter(whitened, found, is_fitted), trend_p_value(found, sequences(whitened))
+
+
+def scatter_p_value(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool) -> float:
+    """P-value of the scatter of friction about its trend; parameters as of `friction_p_values`."""
+    if _is_not_tested(whitened):
+        return 1.0
+    found = without_trend(deviations(whitened, residuals, FRICTION), sequences(whitened))
+    return _scatter(whitened, found, is_fitted)
+
+
+def _is_not_tested(whitened: Sequence["Whitened"]) -> bool:
+    """Whether there are too few recordings, or a tolerance, which friction takes up some of."""
+    return len(whitened) < settings.FEWEST_FOR_SCATTER or any(w.observations.tolerance.any() for w in whitened)
+
+
+def _scatter(whitened: Sequence["Whitened"], found: Deviations, is_fitted: bool) -> float:
     groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
     tests = within_p_value(found, groups), between_p_value(found, groups, is_fitted)
-    return corrected([p for p in tests if p is not None]), trend_p_value(found, sequences(whitened))
+    return corrected([p for p in tests if p is not None])
 
 
 def corrected(p_values: Sequence[float]) -> float:

@@ -53,6 +53,10 @@ SAME_LOAD = 0.05
 # Fewest recordings whose scatter or trend is looked at, and the largest spread that their scatter, without repeats, may
 # give, over the stated one. Chosen: what differs from run to run by more is to be found, not to be allowed for.
 FEWEST_FOR_SCATTER, MOST_SCATTER = 4, 2.0
+# Log Bayes factor below which friction differs between recordings otherwise than from run to run, and deviation of a
+# recording's friction, over the stated spread, from which on a report names it. Chosen: odds of five (p = 0.018), and
+# four spreads, 4 %.
+FRICTION_SCATTERS, FRICTION_DEVIATES = -1.6, 4.0
 # Significance level of a trend of friction, about which scatter then counts. Chosen: a drift by 15 % over seven or more
 # recordings always has one.
 TREND_LEVEL = 0.002
@@ -182,6 +186,8 @@ PRIOR_AGREES, PRIOR_FURTHER, PRIOR_LISTED = 0.5, 0.25, 2 / 3
 # learned for 28 of 34 effects on no list or taken off it, most of them larger than those that it decides, and for 15 of
 # 17 small ones (docs/further-validation.md). Chosen: three in four.
 PRIOR_LAW = 0.75
+# Prior probability that an unlisted effect shows in nothing but the friction of whole recordings. Chosen: even odds.
+IN_FRICTION = 0.5
 # Prior probability that an effect's law is that of the mechanism, and shares of its effect that the mechanism's
 # equation leaves otherwise, log-uniform between these. Practice (`make form-errors`): 17 published laws of 9 effects
 # leave 0 to 49 %, half of them below 1.3 %.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from ccmodel import inputs
 from ccmodel import mechanisms as registry
@@ -68,6 +68,12 @@ class _ModelFile(TypedModel):
     intervals: dict[str, _IntervalEntry] = Field(default_factory=dict)
     fit: dict[str, Any] = Field(default_factory=dict)
     provenance: dict[str, Any] = Field(default_factory=dict)
+
+
+class _Diagnosis(BaseModel):
+    """The key by which diagnosis.json is known; it lies in the same folder as the models."""
+
+    verdict: str | None
 
 
 class _NoModel(TypedModel):
@@ -263,6 +269,14 @@ def _reason_for_none(text: str) -> str | None:
         return None
 
 
+def _is_diagnosis(text: str) -> bool:
+    try:
+        _Diagnosis.model_validate_json(text)
+    except ValidationError:
+        return False
+    return True
+
+
 def read_model_file(path: Path) -> Model:
     """A model from its file.
 
@@ -281,6 +295,9 @@ def read_model_file(path: Path) -> Model:
     except ValidationError as error:
         if (reason := _reason_for_none(text)) is not None:
             raise InputError(f"{path}: holds no model: {reason}") from None
+        if _is_diagnosis(text):
+            model = Path(path).with_name("model.json")
+            raise InputError(f"{path}: is a diagnosis, not a model; use {model} beside it") from None
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the file"
         raise InputError(f"{path}: {where}: {first['msg']}; a model file is what a diagnosis or a fit wrote") from None

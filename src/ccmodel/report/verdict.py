@@ -25,6 +25,8 @@ IN_WORDS = {channel.short_name: channel.words for channel in TABLE.values()}
 NOT_ACCEPTED = "not accepted"
 # Verdict on recordings that contradict one another or batch.yaml: no model is run.
 INPUTS_INCONSISTENT = "inputs-inconsistent"
+# What `not_judged` says a limit on runs or time has left: candidates, and the place of an unexplained mismatch.
+CANDIDATES_LEFT, PLACE_LEFT = "further candidates", "the place of the mismatch"
 # A unit is printed with a prefix if the value is below a tenth of it; these units take none.
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _WITHOUT_PREFIX = ("1", "kg*m^2")
@@ -55,8 +57,24 @@ def sentence(diagnosis: Mapping) -> str:
         return law_sentence(diagnosis)
     if verdict == "undecided":
         return _undecided(diagnosis, missing)
-    places = " or ".join(f"the {place_in_words(place)}" for place in possible_places(diagnosis))
-    return f"Something {missing}, most likely at {places}, and no listed mechanism explains it."
+    where = _where(possible_places(diagnosis))
+    if leaves(diagnosis, CANDIDATES_LEFT):
+        limit = "The search ended at its limit before all candidates were fitted, and none of those fitted explains it."
+        return f"Something {missing}{where}. {limit}"
+    return f"Something {missing}{where}{',' if where else ''} and no listed mechanism explains it."
+
+
+def _where(places: Sequence[str]) -> str:
+    """The possible places of an unexplained mismatch; the conduit alone is what other places were excluded for."""
+    if not places:
+        return ""
+    eliminated = " (by elimination)" if list(places) == ["conduit"] else ""
+    return f", most likely at {' or '.join(f'the {place_in_words(place)}' for place in places)}{eliminated}"
+
+
+def leaves(diagnosis: Mapping, what: str) -> bool:
+    """Whether `not_judged` has an entry on this."""
+    return any(one["what"] == what for one in diagnosis.get("not_judged", ()))
 
 
 def _contradiction(not_judged: Sequence[Mapping]) -> str:
@@ -67,8 +85,13 @@ def _contradiction(not_judged: Sequence[Mapping]) -> str:
 
 
 def possible_places(diagnosis: Mapping) -> list[str]:
-    """Places of a mismatch: those of the mechanisms that are named or most likely, otherwise all that are possible."""
+    """Places of a mismatch: those of the mechanisms that are named or most likely, otherwise all that are possible.
+
+    None if a limit ended the diagnosis before the place of an unexplained mismatch was looked for.
+    """
     acting = [m["place"] for m in [*diagnosis["mechanisms"], *diagnosis["likeliest"]]]
+    if leaves(diagnosis, PLACE_LEFT):
+        return acting
     location = diagnosis["location"]
     return list(dict.fromkeys(p for p in acting or location.get("places") or [location["place"]] if p))
 
@@ -253,8 +276,9 @@ def nearest_sentence(diagnosis: Mapping) -> str | None:
     nearest = diagnosis.get("nearest")
     if not nearest or not nearest["mechanisms"]:
         return None
-    elsewhere = {m["place"] for m in nearest["mechanisms"]}.isdisjoint(possible_places(diagnosis))
-    where = " and at another place than the mismatch" if elsewhere else ""
+    places = possible_places(diagnosis)
+    elsewhere = {m["place"] for m in nearest["mechanisms"]}.isdisjoint(places)
+    where = " and at another place than the mismatch" if places and elsewhere else ""
     return f"Nearest model, {NOT_ACCEPTED}{where}: {'; and '.join(map(claim, nearest['mechanisms']))}."
 
 

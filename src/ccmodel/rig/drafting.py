@@ -18,7 +18,7 @@ from ccmodel.outputs import new_file
 from ccmodel.rig.angle import angle_at, resolution_seen
 from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS, NAMES, recording_id, valid_name
 from ccmodel.rig.calibration import resting_samples
-from ccmodel.rig.findings import LogError
+from ccmodel.rig.findings import Defect, LogError
 from ccmodel.rig.log import read_log
 from ccmodel.rig.overview import ChannelOverview, Overview, overview
 from ccmodel.rig.readers import registry
@@ -139,10 +139,14 @@ def _read(folder: Path) -> tuple[list[_Log], dict[str, str]]:
         try:
             logs.append(_Log(file, read_log(path)[0]))
         except LogError as error:
-            defect = error.defect
-            place = f"row {defect.row}" if defect.row else None
-            refused[file] = ", ".join(part for part in (place, defect.column, defect.text) if part)
+            refused[file] = in_words(error.defect)
     return logs, refused
+
+
+def in_words(defect: Defect) -> str:
+    """What is wrong with a log, in one line without the name of the log."""
+    place = f"row {defect.row}" if defect.row else None
+    return ", ".join(part for part in (place, defect.column, defect.text) if part)
 
 
 def _suffixes() -> tuple[str, ...]:
@@ -173,7 +177,7 @@ def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
     yield "    length_m:  # m"
     yield "    friction_coefficient:  # 0.05 to 0.3 for steel in a lined or greased conduit"
     yield "  accuracy:  # of the sensors; noise and steps are proposals, a data sheet may state more"
-    yield from _accuracy(columns, logs)
+    yield from _accuracy(logs)
     pretensions = {log.file: log.pretension_N for log in logs}
     alike = _alike(pretensions.values())
     differ = alike is None and all(p is not None and p > 0 for p in pretensions.values())
@@ -226,7 +230,7 @@ def _step(steps: Sequence[float]) -> str:
     return f"{step:.6g}  # smallest step seen"
 
 
-def _accuracy(columns: set[str], logs: Sequence[_Log]) -> Lines:
+def _accuracy(logs: Sequence[_Log]) -> Lines:
     # Key, unit, physical columns, raw columns, how to find it.
     rows = (
         ("encoder_rad", "rad", tuple(ANGLE_AT.values()), "encoder_counts", "one count: 2 pi / counts per revolution"),

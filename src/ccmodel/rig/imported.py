@@ -15,12 +15,22 @@ PROVENANCE = "import.json"
 class _Log(BaseModel):
     id: str
     file: str
+    sha256: str = ""
 
 
-class _Import(BaseModel):
-    """What is read of `import.json`."""
+class Import(BaseModel):
+    """What is read of `import.json`.
+
+    Attributes
+    ----------
+    recordings : list
+        Id, file and digest of each log.
+    draft_sha256 : str or None
+        Digest of the `batch.yaml` that an import drafted, as it drafted it; None if none did.
+    """
 
     recordings: list[_Log]
+    draft_sha256: str | None = None
 
 
 class _Entry(BaseModel):
@@ -33,6 +43,18 @@ class _Listed(BaseModel):
     recordings: list[_Entry] = []
 
 
+def earlier_import(folder: Path) -> Import | None:
+    """What the last import into a folder wrote; None without an import.
+
+    Raises
+    ------
+    InputError
+        If `import.json` is not one.
+    """
+    file = folder / PROVENANCE
+    return load_json_model(file, Import, "an import") if file.exists() else None
+
+
 def imported_logs(folder: Path) -> dict[str, str]:
     """Files of the logs that an import has written to a folder, by id of the recording; none without an import.
 
@@ -41,10 +63,8 @@ def imported_logs(folder: Path) -> dict[str, str]:
     InputError
         If `import.json` is not one.
     """
-    file = folder / PROVENANCE
-    if not file.exists():
-        return {}
-    return {log.id: log.file for log in load_json_model(file, _Import, "an import").recordings}
+    found = earlier_import(folder)
+    return {log.id: log.file for log in found.recordings} if found else {}
 
 
 def listed_files(folder: Path) -> list[str]:

@@ -59,38 +59,20 @@ def without(table: pd.DataFrame, rows: NDArray) -> pd.DataFrame:
     return table[~rows] if rows.any() else table
 
 
-def outliers(values: NDArray) -> NDArray:
-    """Positions of impossible readings.
+def _few(distance: NDArray, least: float) -> NDArray:
+    """Positions of impossible readings, ascending, from the `_distances` of all readings.
 
     They are farther from the median of their neighbours than all others are, by a factor. Whatever a rig does, from
     noise to a load that snaps, it does more than once in a recording or within several samples.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Finite readings of a channel.
-
-    Returns
-    -------
-    ndarray of int
-        In ascending order.
     """
-    return _few(*_distances(values))
-
-
-def frequent_outliers(values: NDArray) -> NDArray:
-    """As `outliers`, of readings that are more than a few: each is also far from the readings before and after it.
-
-    A load that snaps again and again is not back in the next sample.
-    """
-    return _many(values, *_distances(values))
-
-
-def _few(distance: NDArray, least: float) -> NDArray:
     return _standing_out(distance, max(int(limits.BAD_CELLS_FRACTION * distance.size), 1), least)
 
 
 def _many(values: NDArray, distance: NDArray, least: float) -> NDArray:
+    """As `_few`, of readings that are more than a few: each is also far from the readings before and after it.
+
+    A load that snaps again and again is not back in the next sample.
+    """
     if not distance.size:
         return np.array([], int)
     steps = np.abs(np.diff(values))

@@ -169,10 +169,11 @@ def read_motion(file: Path, columns: Sequence[str] = MOTION) -> pd.DataFrame:
     """
     try:
         inputs.check_file(file, inputs.LOG)
-        content = io.BytesIO(content_of(file))
+        content = content_of(file)
+        _check_separator(file, content, columns)
         with longer_rows_refused():
             table = pd.read_csv(
-                content, skipinitialspace=True, skip_blank_lines=False, low_memory=False, index_col=False
+                io.BytesIO(content), skipinitialspace=True, skip_blank_lines=False, low_memory=False, index_col=False
             )
     except LogError as error:
         raise InputError(f"{file}: {error.defect.text}") from None
@@ -180,13 +181,20 @@ def read_motion(file: Path, columns: Sequence[str] = MOTION) -> pd.DataFrame:
         raise InputError(f"{file}: is empty; {_expected(columns)}") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{file}: {_expected(columns)}; {' '.join(str(error).split())}") from None
-    head = " ".join(map(str, table.columns))
-    for separator, name in ((";", "';'"), ("\t", "a tab")):
-        if separator in head and set(columns) & set(head.replace(separator, " ").split()):
-            raise InputError(f"{file}: the separator is {name}; a comma is expected")
     # Blank lines at the end are none of the motion.
     filled = np.flatnonzero(table.notna().any(axis=1))
     return checked_motion(table[: filled[-1] + 1 if filled.size else 0], str(file), 2, columns)
+
+
+def _check_separator(file: Path, content: bytes, columns: Sequence[str]) -> None:
+    """Raise `InputError` if another separator than a comma stands between the columns.
+
+    It is looked for in the first line, since decimal commas would cut the rows below into other numbers of cells.
+    """
+    head = content.partition(b"\n")[0].decode("utf-8", "replace").replace('"', "")
+    for separator, name in ((";", "';'"), ("\t", "tabs")):
+        if separator in head and set(columns) & set(head.replace(separator, " ").split()):
+            raise InputError(f"{file}: its columns are separated by {name}; use commas, and decimal points in numbers")
 
 
 def checked_motion(table: pd.DataFrame, source: str, first: int = 0, columns: Sequence[str] = MOTION) -> pd.DataFrame:

@@ -52,6 +52,11 @@ class StudySettings(TypedModel):
         """Files that the study reads, apart from those of its runs."""
         return []
 
+    @property
+    def state(self) -> str:
+        """State of the project that the study reads and no file holds; another one makes the study again."""
+        return ""
+
     def check(self, where: str, config: Configuration) -> None:
         """Refuse settings that do not fit the rest of the configuration.
 

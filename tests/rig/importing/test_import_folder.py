@@ -12,7 +12,7 @@ import pytest
 from made_up_lab import counts, recording, write_text
 
 from ccmodel.rig import readers
-from ccmodel.rig.importing import import_files
+from ccmodel.rig.importing import import_files, write_guess
 from ccmodel.rig.importing.showing import next_of_import
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.rig.log import read_log
@@ -133,8 +133,7 @@ def test_a_repeated_import_replaces_its_own_and_keeps_batch_yaml(lab):
 def test_a_recording_that_was_imported_later_is_named_until_batch_yaml_lists_it(lab, filled_in):
     lab.run(lab.files[:1])
     stated = lab.batch / "batch.yaml"
-    if filled_in:
-        stated.write_text(FILLED_IN)
+    stated.write_text(FILLED_IN if filled_in else stated.read_text() + "# edited\n")
     written = lab.run()
     assert written.unlisted == ["two"]
     assert f"add two to {stated}, which does not list them, then: " in next_of_import(written, lab.batch)
@@ -145,6 +144,87 @@ def test_a_recording_that_was_imported_later_is_named_until_batch_yaml_lists_it(
     ]
     (lab.batch / "two.csv.gz").unlink()
     assert not any("two" in f.file for f in ingest_batch(lab.batch).findings)
+
+
+def test_a_draft_that_nobody_edited_is_drafted_again(lab):
+    """A map that was wrong leaves no pretension and no noise of its own behind."""
+    lab.map.write_text(MAP.replace("unit: N}", "unit: kN}"))
+    lab.run(lab.files[:1])
+    draft = lab.batch / "batch.yaml"
+    assert "pretension_N: 3.5e+03" in draft.read_text()
+    lab.map.write_text(MAP)
+    written = lab.run()
+    assert (written.drafted, written.unlisted, written.changed) == (True, [], [])
+    assert "pretension_N: 3.5 " in draft.read_text() and "two.csv.gz" in draft.read_text()
+
+
+def test_an_edited_draft_is_kept_and_said_to_be_of_an_earlier_import(lab):
+    lab.map.write_text(MAP.replace("unit: N}", "unit: kN}"))
+    lab.run()
+    draft = lab.batch / "batch.yaml"
+    edited = draft.read_text().replace("pulley_radius_m:", "pulley_radius_m: 0.006", 1)
+    draft.write_text(edited)
+    assert lab.run().changed == []
+    lab.map.write_text(MAP)
+    written = lab.run()
+    assert (written.drafted, written.changed, draft.read_text()) == (False, ["one", "two"], edited)
+    said = f"check the values in {draft}: it is of an earlier import, and the log of one and 1 more has changed"
+    assert said in next_of_import(written, lab.batch)
+
+
+def going_back(lab, name="back"):
+    """A log whose 200th line has a time of before."""
+    file = lab.log(name, 3)
+    lines = file.read_text().splitlines()
+    lines[199] = ",".join(["0.1", *lines[199].split(",")[1:]])
+    file.write_text("\n".join(lines) + "\n")
+    return file
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_times_that_go_back_are_refused_with_the_row_of_the_file(lab, beside):
+    files = [*(lab.files if beside else []), going_back(lab)]
+    with pytest.raises(InputError) as caught:
+        lab.run(files)
+    assert str(caught.value) == "back.csv, row 200: the times of 't' must increase: 0.1 s after 0.394 s"
+    assert not lab.batch.exists()
+
+
+def test_a_sample_that_is_repeated_is_no_time_that_goes_back(lab):
+    lines = lab.files[0].read_text().splitlines()
+    lab.files[0].write_text("\n".join([*lines[:50], lines[49], *lines[50:]]) + "\n")
+    lab.run()
+    assert [d.text for d in read_log(lab.batch / "one.csv.gz")[1]] == ["the same sample again: dropped"]
+
+
+def with_a_gap(lab, name="gap"):
+    """A log that no batch can use: it lacks three seconds."""
+    file = lab.log(name, 4)
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join([*lines[:500], *lines[2000:]]) + "\n")
+    return file
+
+
+def test_a_log_that_no_batch_can_use_is_named_with_its_reason(lab):
+    written = lab.run([lab.files[0], with_a_gap(lab)])
+    assert written.unlisted == []
+    (remark,) = written.remarks
+    assert remark.startswith("gap.csv.gz: not used: row 501, time_s, a gap of 3")
+    assert "add" not in next_of_import(written, lab.batch)
+
+
+def test_nothing_is_written_if_no_log_can_be_used(lab):
+    with pytest.raises(InputError, match=r"^gap.csv: its log could not be used: row 501, time_s, a gap of 3"):
+        lab.run([with_a_gap(lab)])
+    assert {entry.name for entry in lab.root.iterdir()} == {"lab", "map.yaml"}
+
+
+def test_a_file_that_is_not_there_is_named_as_it_was_given(lab):
+    given = lab.root / "measurements" / "*.csv"
+    for run in (lambda: lab.run([given]), lambda: write_guess([given], lab.batch)):
+        with pytest.raises(InputError) as caught:
+            run()
+        assert str(caught.value) == f"{given}: there is no such file"
 
 
 def test_an_import_whose_recordings_are_all_listed_has_no_finding_on_it(lab):

@@ -227,6 +227,65 @@ def test_further_files_of_a_recording_are_seen_by_their_names(tmp_path):
     assert table["theta_out_rad"].to_numpy() == pytest.approx(r["theta_out_rad"][: len(table)], abs=2e-3)
 
 
+@pytest.mark.parametrize("every", [1, 2])
+def test_a_file_with_a_time_of_each_end_gives_each_signal_its_own(tmp_path, every):
+    """By the end that both are called by; with a step of 2 the load also has fewer samples than the first time."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        late = T[::every] + 0.25
+        columns = {"time_drive": T, "angle_drive": R["theta_in_rad"], "time_load": late}
+        columns["angle_load"] = np.interp(late, T, R["theta_out_rad"])
+        for name, values in columns.items():
+            file[name] = values
+            file[name].attrs["units"] = "s" if name.startswith("time") else "rad"
+    write_guess([tmp_path / "run.h5"], tmp_path / "batch")
+    stated = load_map(tmp_path / "batch/map.yaml").channels
+    assert stated["theta_in_rad"].time is None
+    assert stated["theta_out_rad"].time.signal == "time_load"
+    table = import_files([tmp_path / "run.h5"], tmp_path / "batch/map.yaml", tmp_path / "batch").recordings["run"].table
+    real = np.interp(table["time_s"] + 0.25, T, R["theta_out_rad"])
+    assert table["theta_out_rad"].to_numpy() == pytest.approx(real, abs=2e-3)
+
+
+def two_files_with_a_copy(root, motion, late_s=0.35):
+    """Recordings with the drive's counts in one file, and the load angle and a copy of the drive angle in another."""
+    for name in ("sine", "step"):
+        encoder = {"t [s]": T, "drive encoder": counts(motion(T), 100_000)}
+        write_text(root / f"{name}_drive.csv", encoder)
+        copy, load = DEG * motion(T + late_s), 0.9 * DEG * motion(T + late_s - 0.02)
+        write_text(root / f"{name}_load.csv", {"t [s]": T, "Drive pos copy [deg]": copy, "load angle [deg]": load})
+    return sorted(root.iterdir())
+
+
+@pytest.mark.parametrize(("of_first", "sign"), [("drive", 1), ("load", -1)])
+def test_a_copy_of_the_drive_angle_in_the_other_file_tells_its_clock(tmp_path, of_first, sign):
+    """Both are surely the drive angle: the counts of the drive's own file are kept, whichever file comes first."""
+    files = two_files_with_a_copy(tmp_path / "lab", lambda t: 0.5 * np.sin(2 * t + 0.3 * t**2))
+    files.sort(key=lambda file: of_first not in file.name)
+    guessed = write_guess(files, tmp_path / "batch").guessed
+    sure = {g.column: role for role, one in guessed.items() for g in one.guesses if g.column and g.sure}
+    assert sure == {"drive_encoder_counts": "drive", "theta_out_rad": "load"}
+    text = (tmp_path / "batch/map.yaml").read_text()
+    assert "# theta_in_rad: " in text and "the same quantity as 'drive encoder' of 'drive'" in text
+    further, first = ("Drive pos copy", "drive encoder")[::sign]
+    assert f"    clock: {{match: [{further}, {first}]}}" in text
+    table = import_files(files, tmp_path / "batch/map.yaml", tmp_path / "batch").recordings["sine"].table
+    drive = table["drive_encoder_counts"].to_numpy() * 2 * np.pi / 100_000
+    late = np.interp(table["time_s"] - 0.02, table["time_s"], drive)
+    assert table["theta_out_rad"].to_numpy()[50:] == pytest.approx(0.9 * late[50:], abs=3e-3)
+
+
+def test_a_copy_that_repeats_tells_no_clock_and_is_not_used(tmp_path):
+    files = two_files_with_a_copy(tmp_path / "lab", lambda t: 0.5 * np.sin(2 * np.pi * t))
+    write_guess(files, tmp_path / "batch")
+    text = (tmp_path / "batch/map.yaml").read_text()
+    assert (
+        "    # clock: {match: [Drive pos copy, drive encoder]}   # the same quantity in both, but the matched" in text
+    )
+    written = import_files(files, tmp_path / "batch/map.yaml", tmp_path / "batch")
+    assert any("taken to start together" in remark for remark in written.recordings["sine"].remarks)
+
+
 def test_files_that_do_not_belong_together_are_said(tmp_path):
     write_text(tmp_path / "lab/a.csv", {"t [s]": T, "motor angle [rad]": R["theta_in_rad"]})
     write_text(tmp_path / "lab/b.csv", {"t [s]": T, "temperature [s]": R["theta_in_rad"]})

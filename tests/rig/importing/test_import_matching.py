@@ -45,6 +45,18 @@ def test_the_stated_uncertainty_holds_in_about_nineteen_of_twenty():
     assert min(inside.values()) >= 24, inside
 
 
+@pytest.mark.parametrize("noise", [0.02, 0.002])
+def test_the_interval_of_the_offset_is_that_of_the_offset_at_time_zero(noise):
+    """The drift's error is an error of this offset too."""
+    inside = 0
+    for seed in range(20):
+        offset, drift = 0.05 * seed - 1, 1e-5 * (seed - 20)
+        found = match_clocks(*two_recordings(seed, offset, drift, noise=noise))
+        inside += abs(found.offset_s - offset) <= found.offset_uncertainty_s
+    # 19 of 20 are expected; fewer than 16 would be seen once in four hundred such tests.
+    assert inside >= 16
+
+
 def test_an_inverted_and_coarse_signal_matches_too():
     here, values, first, first_values = two_recordings(5, 0.75, 1e-4, step=0.9)
     found = match_clocks(here, -values, first, first_values)

@@ -32,6 +32,7 @@ _EXCHANGED = {
         "the tension falls where the cables stretch: the angles of drive and load are exchanged",
     ),
 }
+_TORQUE_ACCURACY = "rig.accuracy.torque_Nm"
 # Factor up to which a relation that supports another may be right: estimates and compliant ends reach it.
 _SAME = 1.8
 
@@ -49,11 +50,18 @@ def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
 def wrong_scales(parities: Sequence[Parity]) -> list[Contradiction]:
     """Scale of the load torque, and stated values of spring, cable and pretension that the recordings contradict."""
     ratios, batch = pooled(parities), parities[0].batch
-    found = _torque(ratios, "load", limits.MOST_TORQUE) or _spring(ratios, batch)
-    found += _torque(ratios, "drive", limits.MOST_DRIVE_TORQUE)
-    found += _pretension(ratios) + [c for c in _cable(ratios, batch) if c.confidence > DOUBTFUL]
-    found += _frequency(ratios)
-    return [*found, *_accuracies(parities)]
+    of_torques = {
+        "load": _torque(ratios, "load", limits.MOST_TORQUE),
+        "drive": _torque(ratios, "drive", limits.MOST_DRIVE_TORQUE),
+    }
+    found = (of_torques["load"] or _spring(ratios, batch)) + of_torques["drive"] + _pretension(ratios)
+    accuracies = _accuracies(parities)
+    if any(of_torques.values()):
+        # With a wrong torque its noise is wrong, and the tensions that follow from it say nothing of the cable.
+        accuracies = [c for c in accuracies if c.what != _TORQUE_ACCURACY]
+    else:
+        found += [c for c in _cable(ratios, batch) if c.confidence > DOUBTFUL]
+    return [*found, *_frequency(ratios), *accuracies]
 
 
 def doubtful_stiffness(parities: Sequence[Parity]) -> list[Contradiction]:
@@ -136,7 +144,7 @@ def _accuracies(parities: Sequence[Parity]) -> list[Contradiction]:
     for end in parities[0].batch.rig.ends:
         own = end.side.encoder_accuracy_rad
         channels_of = {
-            "rig.accuracy.torque_Nm": (end.torque,),
+            _TORQUE_ACCURACY: (end.torque,),
             "rig.accuracy.load_cell_N": (end.force, *end.tensions),
             f"rig.{end.name}.encoder_accuracy_rad" if own else "rig.accuracy.encoder_rad": (end.angle,),
         }
@@ -245,6 +253,9 @@ def _both_angles(ratios: Mapping[str, float]) -> list[Contradiction]:
     found = factors.get("spring", factors.get("amplitude", 1.0))
     if len(factors) < 2 or len(sides) != 1 or beyond(found, limits.AMPLITUDE_FACTOR) == 0:
         return []
+    # A load torque that is too large makes spring and stiffness too large as well. No angle makes it exceed the sum.
+    if _torque(ratios, "load", limits.MOST_TORQUE):
+        return []
     size = "large" if sides == {1} else "small"
     factor = max(found, 1 / found)
     values = ", ".join(f"{name} {ratios[name]:.3g} times" for name in factors)
@@ -329,7 +340,7 @@ def _cable(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
         if ratio < -1 / limits.STATED_FACTOR:
             found.append(Contradiction(*_EXCHANGED[relation]))
             continue
-        other = "bend_rad" if key == "friction_coefficient" else "length_m and the pulley radii"
+        other = "bend_rad" if key == "friction_coefficient" else "length_m, the pulley radii or the scale of a torque"
         if key == "stiffness_N_per_m" and ratio < 1 and ratios.get("travel", 1.0) < limits.LEAST_OF_TWICE:
             share = f"{ratios['travel']:.3g} of the drive's travel arrives at the load"
             other += f", or encoder_counts_per_rev of one end: {share}"

@@ -27,7 +27,7 @@ class Clock:
     offset_s, drift : float
         See above.
     offset_uncertainty_s, drift_uncertainty : float or None
-        Half-widths of the 95 % intervals; the first holds in the middle of the recording. None if not known.
+        Half-widths of the 95 % intervals of these two, the offset being that at t = 0. None if not known.
     how : str
         Where offset and drift are from.
     """

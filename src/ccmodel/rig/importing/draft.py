@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
+from types import MappingProxyType
+from typing import NamedTuple
 
 from ccmodel.outputs import new_file
 from ccmodel.progress import Progress, each_of, silent
@@ -13,10 +15,11 @@ from ccmodel.rig import readers
 from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS
 from ccmodel.rig.columns import UNIT_OF
 from ccmodel.rig.findings import LogError
-from ccmodel.rig.importing.guess import Guess, GuessedFile, guess_file, open_questions
-from ccmodel.rig.importing.map import MAIN, TimeSource
+from ccmodel.rig.importing.guess import Guess, GuessedFile, guess_file, open_questions, without_copies
+from ccmodel.rig.importing.map import MAIN, FileRule, TimeSource
 from ccmodel.rig.importing.names import DRIVE, LOAD, read_name
-from ccmodel.rig.importing.sources import names_of
+from ccmodel.rig.importing.recording import ReadFile, match_files
+from ccmodel.rig.importing.sources import check_given, names_of
 from ccmodel.rig.importing.writing import MAP, check_folder
 from ccmodel.rig.readers.contract import SignalFile
 from ccmodel.sentences import controls_in, shown
@@ -27,6 +30,8 @@ _HEAD = """\
 # This is a guess. Correct it; a line behind "# " is not sure and not used: take "# " away where it is right.
 # Keys of a column: signal, unit, sign, gain, zero, delay_s, file, time (docs/how-to/import-logs.md).
 """
+# Recordings of which a match of clocks is tried: each takes a second, and they move alike.
+_TRIED = 3
 # Words that YAML does not read as text.
 _NO_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "~"}
 _PLAIN = re.compile(r"[^\W\d][\w .+*/°%-]*")
@@ -52,6 +57,22 @@ class GuessedMap:
     guessed: dict[str, GuessedFile]
     names: dict[str, str]
     remarks: list[str]
+
+
+class Match(NamedTuple):
+    """One quantity in two files of a recording.
+
+    Attributes
+    ----------
+    here, there : str
+        Its signal in the further file, and in the first.
+    refusal : str
+        Why the two do not tell the clock; "" if they do.
+    """
+
+    here: str
+    there: str
+    refusal: str = ""
 
 
 def write_guess(files: Sequence[Path], out: Path, progress: Progress = silent) -> GuessedMap:
@@ -83,18 +104,59 @@ def write_guess(files: Sequence[Path], out: Path, progress: Progress = silent) -
         raise InputError(text)
     if not files:
         raise InputError("no file to import: give the rig's logs")
+    check_given(files)
     names = names_of([Path(f) for f in files])
     kinds, roles, patterns, remarks = _sorted_files(_read_all(names, progress), names)
     ends = {role: read_name(role).end if patterns else None for role in roles}
     guessed = {role: guess_file(kinds[key][0][1], ends[role]) for role, key in roles.items()}
+    guessed, copies = without_copies(guessed, ends)
+    matches = _tried(copies, guessed, {role: kinds[key] for role, key in roles.items()}, patterns)
     questions = tuple(open_questions([guess for one in guessed.values() for guess in one.guesses]))
     guessed = {role: replace(one, open=questions) for role, one in guessed.items()}
     looked_at = {role: names[kinds[key][0][0]] for role, key in roles.items()}
     for role, key in roles.items():
         remarks += [f"{looked_at[role]}: {remark}" for remark in kinds[key][0][1].remarks]
     with new_file(target) as fresh:
-        fresh.write_text(map_text(guessed, patterns, remarks), encoding="utf-8")
+        fresh.write_text(map_text(guessed, patterns, remarks, matches), encoding="utf-8")
     return GuessedMap(target, guessed, looked_at, remarks)
+
+
+def _tried(
+    copies: Mapping[str, tuple[str, str]],
+    guessed: Mapping[str, GuessedFile],
+    files: Mapping[str, Sequence[tuple[Path, SignalFile]]],
+    patterns: Mapping[str, str],
+) -> dict[str, Match]:
+    """Copies of a quantity, tried on a few recordings: a motion that repeats does not tell the clock."""
+    first = next(iter(guessed))
+    return {
+        role: Match(*copy, _refusal(copy, *(_by_recording(r, guessed, files, patterns) for r in (role, first))))
+        for role, copy in copies.items()
+    }
+
+
+def _by_recording(
+    role: str,
+    guessed: Mapping[str, GuessedFile],
+    files: Mapping[str, Sequence[tuple[Path, SignalFile]]],
+    patterns: Mapping[str, str],
+) -> dict[str | None, ReadFile]:
+    """Files of a role by the part of their names that the recording is called by."""
+    rule, time = FileRule(pattern=patterns[role]), guessed[role].time
+    return {
+        rule.recording_of(Path(os.path.abspath(path))): ReadFile(role, "", file, time) for path, file in files[role]
+    }
+
+
+def _refusal(
+    copy: tuple[str, str], further: Mapping[str | None, ReadFile], first: Mapping[str | None, ReadFile]
+) -> str:
+    for recording in [name for name in further if name in first][:_TRIED]:
+        try:
+            match_files(further[recording], first[recording], copy)
+        except LogError as error:
+            return error.defect.text
+    return ""
 
 
 def _read_all(names: Mapping[Path, str], progress: Progress) -> dict[Path, SignalFile]:
@@ -215,7 +277,12 @@ def _shared_start(one: str, other: str) -> str:
     return one[:length].rstrip("-_. ")
 
 
-def map_text(guessed: Mapping[str, GuessedFile], patterns: Mapping[str, str], remarks: Sequence[str]) -> str:
+def map_text(
+    guessed: Mapping[str, GuessedFile],
+    patterns: Mapping[str, str],
+    remarks: Sequence[str],
+    matches: Mapping[str, Match] = MappingProxyType({}),
+) -> str:
     """Text of the map.
 
     Parameters
@@ -226,6 +293,8 @@ def map_text(guessed: Mapping[str, GuessedFile], patterns: Mapping[str, str], re
         Patterns of the files of one recording; empty if a recording is one file.
     remarks : sequence of str
         Written as comments.
+    matches : mapping of str to Match
+        By role of a further file, what may tell its clock.
 
     Returns
     -------
@@ -247,11 +316,18 @@ def map_text(guessed: Mapping[str, GuessedFile], patterns: Mapping[str, str], re
         for role, one in guessed.items():
             lines += [f"  {role}:", f"    pattern: {json.dumps(patterns[role])}", *_time_lines(one, "    ")]
             if role != next(iter(guessed)):
-                match = "{match: [signal here, the same quantity in the first file]}"
-                lines += [f"    # clock: {{offset_s: , drift: 0}}   # or {match}; without it, the files start together"]
+                lines.append(_clock_line(matches.get(role)))
     questions = dict.fromkeys(text for one in guessed.values() for text in one.open)
     lines += ["", "# Not in these files:", *(f"# - {shown(question)}" for question in questions)]
     return "\n".join(lines) + "\n"
+
+
+def _clock_line(match: Match | None) -> str:
+    if match is None:
+        text = "{match: [signal here, the same quantity in the first file]}"
+        return f"    # clock: {{offset_s: , drift: 0}}   # or {text}; without it, the files start together"
+    clock = f"clock: {{match: [{_quoted(match.here)}, {_quoted(match.there)}]}}   # the same quantity in both"
+    return f"    # {clock}, but {shown(match.refusal)}" if match.refusal else f"    {clock}"
 
 
 def _time_lines(one: GuessedFile, indent: str) -> list[str]:
@@ -273,6 +349,7 @@ def _channel_line(guess: Guess, role: str | None) -> str:
     parts += ["sign: -1"] if guess.sign < 0 else []
     if guess.column and guess.unit and not guess.sure and guess.needs_gain:
         parts.append(f'gain: "? {UNIT_OF[guess.column]}/{guess.unit}"')
+    parts += [f"time: {time_text(guess.time)}"] if guess.time else []
     parts += [f"file: {role}"] if role else []
     line = f"{'' if guess.sure else '# '}{guess.column}: {{{', '.join(parts)}}}"
     return f"{line}   # {_reasons(guess)}"

@@ -46,6 +46,8 @@ _ENDS = (DRIVE, LOAD)
 _TENSIONS = {DRIVE: (1, 3), LOAD: (2, 4)}
 # Correlation from which two tensions are seen to move alike.
 _ALIKE = 0.5
+# Quantity of each raw column; of the others, the column is the quantity itself.
+_CHANNEL_OF = {column: channel for channel, raw in RAW_COLUMNS.items() for column in raw}
 _UNKNOWN = "its name does not say what it is, and it has no unit: not used"
 
 
@@ -71,6 +73,8 @@ class Guess:
         What the signal measures, and where.
     score : int
         Number of things that speak for it.
+    time : TimeSource or None
+        Its times, if they are not those of its file.
     """
 
     signal: str
@@ -82,6 +86,7 @@ class Guess:
     quantity: str | None = None
     end: str | None = None
     score: int = 0
+    time: TimeSource | None = None
 
     @property
     def needs_gain(self) -> bool:
@@ -143,6 +148,7 @@ def guess_file(file: SignalFile, end: str | None = None) -> GuessedFile:
     guesses = _with_columns(guesses)
     guesses = _without_rivals(guesses)
     guesses = _with_signs(guesses, aligned)
+    guesses = _with_own_times(guesses, file.signals, readings, time) if time else guesses
     return GuessedFile(time, sure, why, tuple(guesses), tuple(open_questions(guesses)))
 
 
@@ -150,13 +156,12 @@ def _guess_time(signals: Sequence[Signal], readings: Mapping[str, Reading]) -> t
     if all(signal.time_s is not None for signal in signals):
         return None, True, "the file stores the time of each sample"
     clocks = [s for s in signals if shapes.is_clock(s.values) and readings[s.name].quantity != names.COUNTER]
-    called = [s for s in signals if readings[s.name].quantity == TIME or units.quantity_of(s.unit) == "a time"]
-    named = [s for s in called if shapes.never_falls(s.values)]
+    named = _called_times(signals, readings)
     if not clocks and not named:
         return None, False, "no signal rises in even steps: state time by its signal, or by rate_Hz"
     signal = (named or clocks)[0]
     why = "called so, and never falls" if named else "rises in even steps"
-    stated = signal.unit if units.quantity_of(signal.unit) == "a time" else readings[signal.name].unit
+    stated = _unit_of_time(signal, readings)
     possible = shapes.units_of_clock(signal.values)
     step = float(np.median(np.diff(signal.values[np.isfinite(signal.values)])))
     if stated:
@@ -168,6 +173,37 @@ def _guess_time(signals: Sequence[Signal], readings: Mapping[str, Reading]) -> t
         return TimeSource(signal=signal.name, unit=possible[0]), bool(named), why
     why += f"; a step of {step:.6g} may be in {' or '.join(possible or shapes.TIME_UNITS)}: state the unit"
     return TimeSource(signal=signal.name, unit=(possible or ["s"])[0]), False, why
+
+
+def _with_own_times(
+    guesses: list[Guess], signals: Sequence[Signal], readings: Mapping[str, Reading], time: TimeSource
+) -> list[Guess]:
+    """Signals of a file with several times: the one of their end, or the only one with as many samples."""
+    clocks = [s for s in _called_times(signals, readings) if s.name != time.signal and _unit_of_time(s, readings)]
+    size = {s.name: s.values.size for s in signals}
+    result = []
+    for g in guesses:
+        end = g.end if g.end and readings[time.signal or ""].end != g.end else None
+        is_other = size[g.signal] != size[time.signal or ""]
+        fits = [s for s in clocks if size[s.name] == size[g.signal]]
+        fits = [s for s in fits if is_other or (end and readings[s.name].end == end)]
+        if g.column and len(fits) == 1:
+            own = TimeSource(signal=fits[0].name, unit=_unit_of_time(fits[0], readings))
+            why = f"its time is '{fits[0].name}', {'with as many samples' if is_other else f'that of the {end}'}"
+            g = replace(g, time=own, why=(*g.why, why))
+        result.append(g)
+    return result
+
+
+def _called_times(signals: Sequence[Signal], readings: Mapping[str, Reading]) -> list[Signal]:
+    """Signals that are called a time or have the unit of one, and never fall."""
+    called = [s for s in signals if readings[s.name].quantity == TIME or units.quantity_of(s.unit) == "a time"]
+    return [s for s in called if shapes.never_falls(s.values)]
+
+
+def _unit_of_time(signal: Signal, readings: Mapping[str, Reading]) -> str:
+    """Unit of a time as the file or its name states it; "" if neither does."""
+    return signal.unit if units.quantity_of(signal.unit) == "a time" else readings[signal.name].unit
 
 
 def _first_guess(signal: Signal, reading: Reading) -> Guess:
@@ -436,6 +472,57 @@ def _without_rivals(guesses: list[Guess]) -> list[Guess]:
             why = (*g.why, f"the same quantity as {kept}: only one of the two can be used")
             result[result.index(g)] = replace(g, sure=False, why=why)
     return result
+
+
+def without_copies(
+    guessed: Mapping[str, GuessedFile], ends: Mapping[str, str | None]
+) -> tuple[dict[str, GuessedFile], dict[str, tuple[str, str]]]:
+    """Only one file of a recording surely has a quantity; a copy of it in another file tells the other's clock.
+
+    Parameters
+    ----------
+    guessed : mapping of str to GuessedFile
+        Guesses by role of the file, the first file of a recording first.
+    ends : mapping of str to str or None
+        End of the transmission that each file is called by.
+
+    Returns
+    -------
+    guessed : dict of str to GuessedFile
+        Copies are not sure. A file keeps the quantities of its own end, and the first file all others.
+    matches : dict of str to tuple of str
+        By role, the signal of a further file and the first file's signal of the same quantity.
+    """
+    first = next(iter(guessed))
+    sure: dict[str, dict[str, Guess]] = {}
+    for role, one in guessed.items():
+        for g in one.guesses:
+            if g.column and g.sure:
+                sure.setdefault(_CHANNEL_OF.get(g.column, g.column), {})[role] = g
+    changed: dict[str, GuessedFile] = dict(guessed)
+    matches: dict[str, tuple[str, str]] = {}
+    # An angle is smoother than a torque or a force, so that it tells the clock best.
+    for channel in sorted(sure, key=lambda channel: channel not in ANGLE_AT.values()):
+        copies = sure[channel]
+        kept = next((role for role, g in copies.items() if ends.get(role) == g.end), next(iter(copies)))
+        for role, copy in copies.items():
+            if role != kept and _are_same(copy, copies[kept]):
+                changed[role] = _without(changed[role], copy, f"'{copies[kept].signal}' of '{kept}'")
+            if role != first and first in copies and _are_same(copy, copies[first]):
+                matches.setdefault(role, (copy.signal, copies[first].signal))
+    return changed, matches
+
+
+def _are_same(one: Guess, other: Guess) -> bool:
+    """Whether a log can have one of two columns only. A motor's current and a torque sensor can stand side by side."""
+    channels = [_CHANNEL_OF.get(g.column or "", g.column) for g in (one, other)]
+    return channels[0] == channels[1] and (one.column == other.column or channels[0] in (one.column, other.column))
+
+
+def _without(file: GuessedFile, copy: Guess, original: str) -> GuessedFile:
+    why = (*copy.why, f"the same quantity as {original}: only one of the two can be used")
+    guesses = tuple(replace(g, sure=False, why=why) if g is copy else g for g in file.guesses)
+    return replace(file, guesses=guesses)
 
 
 def _with_signs(guesses: list[Guess], aligned: Mapping[str, NDArray]) -> list[Guess]:

@@ -112,10 +112,10 @@ def _fit(start: float, begin: float, here: NDArray, first_begin: float, there: N
     gain, zero = np.polyfit(np.interp(t + start, t_first, there), here, 1)
     fit = least_squares(residuals, [start, 0.0, gain, zero], jac=jacobian, x_scale="jac", xtol=1e-12, ftol=1e-12)
     centre, drift = map(float, fit.x[:2])
-    half = _half_widths(fit.jac, fit.fun)
-    text = f"matched over {np.ptp(t):.4g} s"
-    # t_first = t + centre + drift (t - middle), so that the offset at time zero is centre - drift * middle.
-    clock = Clock(centre - drift * middle, drift, float(half[0]), float(half[1]), text)
+    # t_first = t + centre + drift (t - middle), so that the offset at time zero is centre - drift * middle. An error of
+    # the drift is an error of this offset, however well the offset in the middle is known.
+    offset, of_drift = _half_widths(fit.jac, fit.fun, np.array([[1.0, -middle, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]]))
+    clock = Clock(centre - drift * middle, drift, offset, of_drift, f"matched over {np.ptp(t):.4g} s")
     # Fits from several starts may end as one clock, and have its overlap.
     overlap = _inside(whole + centre + drift * (whole - middle), t_first).sum() / min(whole.size, there.size)
     return _Fit(clock, float(np.var(fit.fun) / np.var(here)), float(overlap), centre)
@@ -195,10 +195,20 @@ def _on_grid(time: NDArray, values: NDArray, step: float) -> NDArray:
     return even - even.mean()
 
 
-def _half_widths(jacobian: NDArray, residual: NDArray) -> NDArray:
-    """Half-widths of the intervals, with errors that are correlated within blocks."""
+def _half_widths(jacobian: NDArray, residual: NDArray, sums: NDArray) -> list[float]:
+    """Half-widths of the intervals of sums of the parameters, with errors that are correlated within blocks.
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (n, p)
+    residual : ndarray, shape (n,)
+    sums : ndarray, shape (k, p)
+        Coefficients of the parameters in each sum.
+    """
     bread = np.linalg.pinv(jacobian.T @ jacobian)
     blocks = np.array_split(jacobian * residual[:, None], _BLOCKS)
     scores = np.array([block.sum(axis=0) for block in blocks])
     covariance = bread @ (scores.T @ scores) @ bread * _BLOCKS / (_BLOCKS - jacobian.shape[1])
-    return student.ppf((1 + _CONFIDENCE) / 2, _BLOCKS - jacobian.shape[1]) * np.sqrt(np.diag(covariance))
+    variances = np.einsum("ki,ij,kj->k", sums, covariance, sums)
+    quantile = student.ppf((1 + _CONFIDENCE) / 2, _BLOCKS - jacobian.shape[1])
+    return [float(width) for width in quantile * np.sqrt(np.maximum(variances, 0.0))]

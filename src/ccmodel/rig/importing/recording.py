@@ -1,6 +1,6 @@
 """One recording: the signals of its files become the columns of its log."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -55,8 +55,18 @@ class Built:
 
 
 @dataclass(frozen=True)
-class _File:
-    """A file of the recording: its role, name, signals and the times that the map states for it."""
+class ReadFile:
+    """A file of a recording, as it was read.
+
+    Attributes
+    ----------
+    role, name : str
+        Role in the recording; name for messages.
+    read : SignalFile
+        Its signals.
+    time : TimeSource or None
+        The times that the map states for it.
+    """
 
     role: str
     name: str
@@ -65,6 +75,7 @@ class _File:
 
     @property
     def signals(self) -> dict[str, Signal]:
+        """Its signals by name."""
         return {signal.name: signal for signal in self.read.signals}
 
     @property
@@ -80,6 +91,33 @@ class _File:
         close = nearest(name, self.signals, 0.6)
         hint = f"did you mean '{close}'?" if close else f"it has {_few(list(self.signals))}"
         raise FileError(self.name, None, None, f"has no signal '{name}'; {hint}")
+
+    def check_times(self, signal: Signal, stated: TimeSource | None) -> None:
+        """Check that the times of a signal increase.
+
+        A row that repeats the one before does no harm: reading a log drops it.
+
+        Raises
+        ------
+        FileError
+            With the row, or the sample in a file without rows, and both times in the unit of the file.
+        """
+        source = stated or self.time
+        if source is not None and source.signal is None:
+            return
+        clock = self.signal(source.signal or "") if source else signal
+        unit = (source.unit or clock.unit) if source else "s"
+        times = clock.values if source or signal.time_s is None else signal.time_s
+        has = np.flatnonzero(np.isfinite(times) & np.isfinite(signal.values))
+        step, change = np.diff(times[has]), np.diff(signal.values[has])
+        wrong = np.flatnonzero((step < 0) | ((step == 0) & (change != 0)))
+        if not wrong.size:
+            return
+        before, at = has[wrong[0]], has[wrong[0] + 1]
+        row = None if self.read.rows is None else int(self.read.rows[at])
+        place = f" (sample {at + 1})" if row is None else ""
+        text = f"the times of '{clock.name}' must increase: {times[at]:.9g} {unit} after {times[before]:.9g} {unit}"
+        raise FileError(self.name, row, None, text + place)
 
     def times(self, signal: Signal, stated: TimeSource | None) -> NDArray:
         """Times of a signal on this file's clock, s: those stated for it, those of the file, or its own axis."""
@@ -142,7 +180,7 @@ def build(source: Source, stated: ImportMap, names: Mapping[Path, str]) -> Built
     return Built(table, started, formulas, joined.costs, joined.cut_s, remarks + joined.remarks)
 
 
-def _read(role: str, path: Path, stated: ImportMap, name: str) -> _File:
+def _read(role: str, path: Path, stated: ImportMap, name: str) -> ReadFile:
     rule = stated.rule(role)
     try:
         read = readers.read_signals(path, (rule and rule.text) or stated.text)
@@ -154,11 +192,11 @@ def _read(role: str, path: Path, stated: ImportMap, name: str) -> _File:
         # A time for all files of a recording is that of the files that have it; others store their own.
         if role == MAIN or stated.time.signal in here or all(s.time_s is None for s in read.signals):
             time = stated.time
-    return _File(role, name, read, time)
+    return ReadFile(role, name, read, time)
 
 
 def _samples(
-    column: str, channel: Channel, files: Mapping[str, _File], clocks: Mapping[str, Clock], remarks: list[str]
+    column: str, channel: Channel, files: Mapping[str, ReadFile], clocks: Mapping[str, Clock], remarks: list[str]
 ) -> tuple[Samples, str]:
     """One column before it is joined, and its formula."""
     file = _file_of(channel, files)
@@ -171,6 +209,7 @@ def _samples(
     if channel.unit and units.is_unit(signal.unit) and signal.unit != channel.unit and _differ(unit, signal.unit):
         remarks.append(f"{file.name}: '{signal.name}' is taken in {unit} as the map says; the file says {signal.unit}")
     times = clocks[file.role].on_first(file.times(signal, channel.time)) - channel.delay_s
+    file.check_times(signal, channel.time)
     known = np.isfinite(times)
     if (timeless := np.flatnonzero(~known & np.isfinite(signal.values))).size:
         more = f" (and {timeless.size - 1} more)" if timeless.size > 1 else ""
@@ -186,7 +225,7 @@ def _samples(
     return samples, _formula(channel, unit, factor, column)
 
 
-def _file_of(channel: Channel, files: Mapping[str, _File]) -> _File:
+def _file_of(channel: Channel, files: Mapping[str, ReadFile]) -> ReadFile:
     if channel.file is not None:
         return files[channel.file]
     having = [file for file in files.values() if channel.signal in file.signals]
@@ -221,17 +260,13 @@ def _formula(channel: Channel, unit: str, factor: float, column: str) -> str:
     return f"{factor:.12g} {UNIT_OF[column]}/{unit or '1'} * {reading}"
 
 
-def _clock(file: _File, first: _File, stated: ImportMap, remarks: list[str]) -> Clock:
+def _clock(file: ReadFile, first: ReadFile, stated: ImportMap, remarks: list[str]) -> Clock:
     """Clock of a file: stated, matched, from absolute times, or taken to start with the first file."""
     if file is first:
         return Clock()
     rule = stated.rule(file.role)
     if rule and rule.clock and rule.clock.match:
-        here, there = file.signal(rule.clock.match[0]), first.signal(rule.clock.match[1])
-        try:
-            return match_clocks(file.times(here, None), here.values, first.times(there, None), there.values)
-        except LogError as error:
-            raise FileError(file.name, *error.args) from None
+        return match_files(file, first, rule.clock.match)
     if rule and rule.clock and rule.clock.offset_s is not None:
         return Clock(rule.clock.offset_s, rule.clock.drift, None, None, "stated in the map")
     if file.started and first.started:
@@ -246,7 +281,31 @@ def _clock(file: _File, first: _File, stated: ImportMap, remarks: list[str]) -> 
     return Clock(begins[1] - begins[0], 0.0, None, None, "taken to start together")
 
 
-def _first_time(file: _File) -> float:
+def match_files(file: ReadFile, first: ReadFile, match: Sequence[str]) -> Clock:
+    """Clock of a file from a quantity that both have.
+
+    Parameters
+    ----------
+    file, first : ReadFile
+        A further file of a recording, and its first.
+    match : sequence of two str
+        Names of the signals, that of the further file first.
+
+    Raises
+    ------
+    FileError
+        If the two do not show one clock.
+    """
+    here, there = file.signal(match[0]), first.signal(match[1])
+    try:
+        return match_clocks(file.times(here, None), here.values, first.times(there, None), there.values)
+    except FileError:
+        raise
+    except LogError as error:
+        raise FileError(file.name, *error.args) from None
+
+
+def _first_time(file: ReadFile) -> float:
     """Time of a file's first sample on its own clock, s."""
     if file.time is not None and file.time.signal is not None:
         clock = file.signal(file.time.signal)

@@ -67,9 +67,15 @@ def next_of_import(written: Written, out: Path) -> str:
     """What to do after an import."""
     folder = shlex.quote(str(out))
     batch_file = Path(out) / BATCH
-    filled = f"fill in {batch_file}, then: " if written.drafted else ""
+    first = [f"fill in {batch_file}"] if written.drafted else []
+    if written.changed:
+        whose = _and_more(written.changed)
+        first.append(
+            f"check the values in {batch_file}: it is of an earlier import, and the log of {whose} has changed"
+        )
     if written.unlisted:
-        filled = f"add {', '.join(written.unlisted)} to {batch_file}, which does not list them, then: "
+        first.append(f"add {', '.join(written.unlisted)} to {batch_file}, which does not list them")
+    filled = f"{'; '.join(first)}, then: " if first else ""
     count = len(written.recordings)
     return f"wrote {count} recording{'s' if count > 1 else ''} to {out}. Next, {filled}ccmodel check {folder}"
 

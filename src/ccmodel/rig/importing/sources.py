@@ -8,7 +8,7 @@ from pathlib import Path, PurePath
 from ccmodel.rig.batch import recording_id
 from ccmodel.rig.importing.map import MAIN, ImportMap
 from ccmodel.sentences import controls_in, shown
-from ccmodel.typed import InputError
+from ccmodel.typed import InputError, Problem
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,19 @@ class Source:
 
     id: str
     files: dict[str, Path]
+
+
+def check_given(files: Sequence[Path]) -> None:
+    """Check that files are there, before their common folder is taken off their names.
+
+    Raises
+    ------
+    InputError
+        A line for each file that is not there, by its path as it was given.
+    """
+    absent = [str(file) for file in files if not os.path.lexists(file)]
+    if absent:
+        raise InputError.of(*(Problem(shown(file), None, "there is no such file") for file in absent))
 
 
 def names_of(files: Sequence[Path]) -> dict[Path, str]:

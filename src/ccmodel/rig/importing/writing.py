@@ -18,12 +18,13 @@ from ccmodel.progress import Progress, each_of, silent, within
 from ccmodel.provenance import file_digest
 from ccmodel.rig.batch import NAMES, valid_name
 from ccmodel.rig.columns import TIME
-from ccmodel.rig.drafting import draft_batch
-from ccmodel.rig.findings import FileError
-from ccmodel.rig.imported import PROVENANCE, imported_logs, listed_files, unlisted_logs
+from ccmodel.rig.drafting import draft_batch, in_words
+from ccmodel.rig.findings import FileError, LogError
+from ccmodel.rig.imported import PROVENANCE, Import, earlier_import, imported_logs, listed_files, unlisted_logs
 from ccmodel.rig.importing.map import ImportMap, load_map
 from ccmodel.rig.importing.recording import Built, build
-from ccmodel.rig.importing.sources import Source, names_of, recordings_of
+from ccmodel.rig.importing.sources import Source, check_given, names_of, recordings_of
+from ccmodel.rig.log import read_log
 from ccmodel.typed import InputError, Problem
 from ccmodel.version import __version__
 
@@ -48,11 +49,14 @@ class Written:
     recordings : dict of str to Built
         Logs by id of the recording.
     remarks : list of str
-        Files that were left out.
+        Files that were left out, and logs that no batch can use, with the reason.
     drafted : bool
         Whether a `batch.yaml` was drafted.
     unlisted : list of str
-        Recordings that an earlier `batch.yaml` does not list, so that no command will use them.
+        Recordings that an earlier `batch.yaml` does not list, so that no command will use them. Those that no batch can
+        use are not among them.
+    changed : list of str
+        Recordings whose logs differ from those of the import before, for which an earlier `batch.yaml` was written.
     """
 
     folder: Path
@@ -60,6 +64,7 @@ class Written:
     remarks: list[str] = field(default_factory=list)
     drafted: bool = False
     unlisted: list[str] = field(default_factory=list)
+    changed: list[str] = field(default_factory=list)
 
 
 def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Progress = silent) -> Written:
@@ -72,8 +77,8 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Pro
     map_file : Path
         What each column is made of.
     out : Path
-        Folder of the batch. The result of an earlier import is replaced as a whole, and only if this import succeeds; a
-        `batch.yaml` in it stays.
+        Folder of the batch. The result of an earlier import is replaced as a whole, and only if this import succeeds. A
+        `batch.yaml` in it stays, unless it is the draft of an earlier import that nobody has edited.
     progress : Progress
 
     Returns
@@ -84,7 +89,8 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Pro
     Raises
     ------
     InputError
-        If the map or a file cannot be used (a line for each), `out` holds anything but an import, or a file lies in it.
+        If the map or a file cannot be used (a line for each), no recording makes a log that a batch can use, `out`
+        holds anything but an import, or a file lies in it.
     """
     out = Path(out).resolve()
     check_folder(out)
@@ -92,24 +98,32 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Pro
         raise InputError(
             f"{inside[0]}: lies in {out}, which an import replaces; give the rig's own files or another folder"
         )
+    check_given(files)
     map_content = _content(map_file)
     stated = load_map(map_file)
     sources, remarks = recordings_of([Path(f) for f in files], stated)
     names = names_of([file for source in sources for file in source.files.values()])
     built = _build_all(sources, stated, names, within(progress, 0.0, BUILDING))
+    earlier, drafts = earlier_import(out), _is_to_be_drafted(out)
     with new_folder(out) as fresh:
         fresh.mkdir()
         writing = each_of(built.items(), within(progress, BUILDING, 1.0), lambda one: f"writing {one[0]}")
         for id_, one in writing:
             _write_log(fresh / f"{id_}.csv.gz", one.table)
         (fresh / MAP).write_bytes(map_content)
-        text = json.dumps(_provenance(fresh, sources, built, names, remarks), indent=1, ensure_ascii=False)
-        (fresh / PROVENANCE).write_text(text + "\n", encoding="utf-8")
-        if (out / BATCH).exists():
+        if drafts:
+            _draft(fresh, sources, names)
+        else:
             shutil.copy2(out / BATCH, fresh / BATCH)
-    # In its place, so that a message on a log names a file that is there.
-    drafted = _draft(out)
-    return Written(out, built, remarks, drafted, _unlisted(out))
+        draft_sha256 = _sha256(fresh / BATCH) if drafts else earlier and earlier.draft_sha256
+        provenance = _provenance(fresh, sources, built, names, remarks) | {"draft_sha256": draft_sha256}
+        text = json.dumps(provenance, indent=1, ensure_ascii=False)
+        (fresh / PROVENANCE).write_text(text + "\n", encoding="utf-8")
+    unlisted = _unlisted(out)
+    unusable = _unusable(out, unlisted)
+    remarks = remarks + [f"{file}: not used: {text}" for file, text in unusable.items()]
+    left = [id_ for id_, file in unlisted.items() if file not in unusable]
+    return Written(out, built, remarks, drafts, left, [] if drafts else _changed(out, earlier))
 
 
 def check_folder(out: Path) -> None:
@@ -140,12 +154,30 @@ def _files_of_import(folder: Path) -> list[str]:
         raise InputError(f"{error}; give a new or empty folder") from None
 
 
-def _unlisted(folder: Path) -> list[str]:
-    """Recordings of an import that `batch.yaml` does not list; of one that cannot be read, `ccmodel check` says why."""
+def _unlisted(folder: Path) -> dict[str, str]:
+    """Logs of an import that `batch.yaml` does not list, by id; none of a file that `ccmodel check` refuses."""
     try:
-        return list(unlisted_logs(folder, listed_files(folder)))
+        return unlisted_logs(folder, listed_files(folder))
     except InputError:
-        return []
+        return {}
+
+
+def _unusable(folder: Path, unlisted: dict[str, str]) -> dict[str, str]:
+    """Why no batch can use a log, by the file of the log. A draft leaves out these and no others."""
+    reasons = {}
+    for file in unlisted.values():
+        try:
+            read_log(folder / file)
+        except LogError as error:
+            reasons[file] = in_words(error.defect)
+    return reasons
+
+
+def _changed(folder: Path, earlier: Import | None) -> list[str]:
+    """Recordings whose logs are not those of the import before."""
+    before = {log.id: log.sha256 for log in earlier.recordings if log.sha256} if earlier else {}
+    now = earlier_import(folder)
+    return [log.id for log in (now.recordings if now else []) if before.get(log.id, log.sha256) != log.sha256]
 
 
 def _content(file: Path) -> bytes:
@@ -166,16 +198,12 @@ def _build_all(
         try:
             built[source.id] = build(source, stated, names)
         except FileError as error:
-            problems.append(Problem(error.file, None, _one_line(error)))
+            row, column, text, _ = error.defect
+            place = error.file if row is None else f"{error.file}, row {row}"
+            problems.append(Problem(place, None, f"{column}: {text}" if column else text))
     if problems:
         raise InputError.of(*dict.fromkeys(problems))
     return built
-
-
-def _one_line(error: FileError) -> str:
-    defect = error.defect
-    place = [f"line {defect.row}" if defect.row is not None else None, defect.column]
-    return ", ".join(p for p in place if p) + (": " if any(place) else "") + defect.text
 
 
 def _write_log(path: Path, table: pd.DataFrame) -> None:
@@ -239,9 +267,20 @@ def _sha256(path: Path) -> str:
     return file_digest(path)
 
 
-def _draft(folder: Path) -> bool:
-    """Draft a `batch.yaml` where there is none."""
-    if (folder / BATCH).exists():
-        return False
-    draft_batch(folder)
-    return True
+def _is_to_be_drafted(folder: Path) -> bool:
+    """Whether a folder has no `batch.yaml`, or the draft of an import as it was drafted."""
+    file, earlier = folder / BATCH, earlier_import(folder)
+    return not file.exists() or (earlier is not None and earlier.draft_sha256 == _sha256(file))
+
+
+def _draft(fresh: Path, sources: Sequence[Source], names: dict[Path, str]) -> None:
+    """Draft a `batch.yaml`; `InputError` on the files of the recordings if no log can be used."""
+    try:
+        draft_batch(fresh)
+    except InputError as error:
+        given = {f"{source.id}.csv.gz": names[next(iter(source.files.values()))] for source in sources}
+        problems = [(given.get(Path(p.file).name), p.text) for p in error.problems]
+        if not problems or not all(file for file, _ in problems):
+            raise
+        texts = [Problem(str(file), None, f"its log could not be used: {text}") for file, text in problems]
+        raise InputError.of(*texts) from None

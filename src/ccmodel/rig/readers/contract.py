@@ -49,11 +49,14 @@ class SignalFile:
         Absolute time (UTC) of time zero, if the file states it.
     remarks : tuple of str
         What reading assumed or left out, a sentence each.
+    rows : ndarray of int, shape (n,), or None
+        Line of each sample in a text file, counted from 1; None for other formats.
     """
 
     signals: tuple[Signal, ...]
     started: datetime | None = None
     remarks: tuple[str, ...] = ()
+    rows: NDArray | None = None
 
 
 class TextLayout(TypedModel):

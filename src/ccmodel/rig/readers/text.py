@@ -103,7 +103,7 @@ def read(path: Path, layout: TextLayout | None = None) -> SignalFile:
     separator = _NAMES_OF_SEPARATORS.get(grid.separator, f"'{grid.separator}'")
     decimal = "comma" if grid.decimal == "," else "point"
     read_as = f"read as text: separator {separator}, decimal {decimal}, encoding {encoding}, {header}"
-    return SignalFile(signals, started, (read_as, *remarks, *dropped, *more))
+    return SignalFile(signals, started, (read_as, *remarks, *dropped, *more), table.index.to_numpy())
 
 
 FORMAT = Format("text file", (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".tab", ".prn"), read)

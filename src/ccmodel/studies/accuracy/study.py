@@ -139,7 +139,7 @@ def judge(settings: Accuracy, runs: Sequence[Run], measuring: Measuring) -> Outc
     table = comparison_table([case for run in runs for case in _cases(run)], settings, measuring)
     lines = summary(table, settings)
     flat = pd.DataFrame([line | {"inputs_left_out": " ".join(line["inputs_left_out"])} for line in lines])
-    figures = [draw(table, lines) for draw in (scatter_figure, ratio_figure)]
+    figures = [draw(table, lines, settings.coverage_factor) for draw in (scatter_figure, ratio_figure)]
     return Outcome(figures, [flat, table], {"settings": settings.model_dump(), "quantities": lines})
 
 

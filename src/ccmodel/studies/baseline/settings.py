@@ -7,6 +7,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from ccmodel.accuracy.comparison import Limits
+from ccmodel.accuracy.history import head
 from ccmodel.accuracy.measure import NOT_ACCEPTED
 from ccmodel.studies.settings import Configuration, StudySettings
 
@@ -32,6 +33,11 @@ class AgainstBaseline(StudySettings, Limits):
     def files(self) -> list[str]:
         """Files that the study reads, as far as they exist."""
         return [name for name in (self.file, self.history) if Path(name).exists()]
+
+    @property
+    def state(self) -> str:
+        """Commit of the sources, which a baseline and a history state."""
+        return head()[0]
 
     def needs(
         self, config: Configuration, studies: Mapping[str, StudySettings], batches: Sequence[str]

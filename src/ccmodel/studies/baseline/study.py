@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from ccmodel.accuracy.baseline import read_baseline
+from ccmodel.accuracy.baseline import read_baseline, versions
 from ccmodel.accuracy.comparison import GAINED, Change, Comparison, compare
 from ccmodel.accuracy.gate import summary
 from ccmodel.accuracy.history import head, read_history, rows_of
@@ -39,6 +39,7 @@ def judge(settings: AgainstBaseline, runs: Sequence[Run], measuring: Measuring) 
     content = {
         "commit": commit,
         "date": date,
+        "versions": versions(),
         "settings": settings.model_dump(),
         "message": message,
         "accepted": accepted,

@@ -160,20 +160,17 @@ def _write(outcome: Outcome, out: Path, page: str | None) -> None:
         write_diagnosis(out / PAGE_FILE, outcome.found, page)
 
 
-def check_options(options: Options, has_baseline: bool, prefix: str = "") -> None:
-    """Raise `InputError` if an excluded name is no mechanism, or a baseline is to be frozen that there is not.
-
-    `prefix` stands before the names of options in messages, "--" on the command line.
-    """
+def check_options(options: Options, has_baseline: bool) -> None:
+    """Raise `InputError` if an excluded name is no mechanism, or a baseline is to be frozen that there is not."""
     try:
         for name in options.without:
             registry.get(name)
             if name in registry.laws():
-                raise InputError(f"{prefix}without: {name} is a learned law; only a listed mechanism can be excluded")
+                raise InputError(f"without: {name} is a learned law; only a listed mechanism can be excluded")
     except registry.UnknownMechanismError as error:
-        raise InputError(f"{prefix}without: {error}") from None
+        raise InputError(f"without: {error}") from None
     if options.freeze and not has_baseline:
-        raise InputError(f"{prefix}freeze: there is no baseline to freeze; name one with {prefix}baseline")
+        raise InputError("freeze: there is no baseline to freeze; state its file, baseline=FILE or --baseline FILE")
 
 
 def diagnose_recordings(

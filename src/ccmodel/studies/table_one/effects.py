@@ -60,18 +60,28 @@ def scaled(effect: Effect, factor: float) -> Effect:
 
 
 def finer(effect: Effect, grid: Grid) -> list[Effect]:
-    """Strengths between an effect's neighbours on the grid."""
-    step = np.log(_step(effect, grid))
-    return [scaled(effect, float(f)) for f in np.exp(np.linspace(-step, step, grid.finer + 2)[1:-1])]
+    """Strengths between an effect's neighbours on the grid, evenly spaced in their logarithm.
+
+    At an end of the grid they reach as far outwards as inwards, by the same factor. Without a neighbour there are none.
+    """
+    if (factors := _factors_to_neighbours(effect, grid)) is None:
+        return []
+    return [scaled(effect, float(f)) for f in np.geomspace(*factors, grid.finer + 2)[1:-1]]
 
 
-def _step(effect: Effect, grid: Grid) -> float:
-    """Factor between an effect's strength and its neighbours on the grid."""
+def _factors_to_neighbours(effect: Effect, grid: Grid) -> tuple[float, float] | None:
+    """Next weaker and next stronger strength on the grid, on the effect's side of neutral, over its own strength."""
     if effect.is_set_up:
-        return 2.0
-    p = _strength_of(effect)
-    sizes = np.sort([abs(v - p.neutral) for v in _strengths(p, grid)])
-    return float((sizes[-1] / sizes[0]) ** (1 / (grid.strengths - 1)))
+        own, tried = effect.values[DIFFERENCE], grid.set_up_differences
+    else:
+        p = _strength_of(effect)
+        own, tried = effect.values[p.name] - p.neutral, [v - p.neutral for v in _strengths(p, grid)]
+    sizes = np.unique([abs(d) for d in tried if d * own > 0])
+    if sizes.size < 2:
+        return None
+    steps = sizes[1:] / sizes[:-1]
+    at = int(np.argmin(np.abs(sizes - abs(own))))
+    return 1 / float(steps[max(at - 1, 0)]), float(steps[min(at, steps.size - 1)])
 
 
 def _of_mechanism(name: str, place: str, grid: Grid) -> list[Effect]:

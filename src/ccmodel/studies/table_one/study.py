@@ -87,7 +87,7 @@ def _best_rows(found: pd.DataFrame) -> list[int]:
 
 
 def _finer_cases(study: TableOne, case: Case) -> list[Case]:
-    """The case of one effect at further strengths, between the neighbours of its strength on the coarse grid."""
+    """The case of one effect at further strengths near its own (`finer`)."""
     condition, (effect,) = case
     return [(condition, (e,)) for e in finer(effect, study.grid)]
 
