@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 
 from ccmodel.cli import app
 from ccmodel.rig.ingest import ingest_batch
-from ccmodel.rig.overview import motion_of, overview, overview_of
+from ccmodel.rig.overview import _best_fit, motion_of, overview, overview_of
 
 TIME = np.arange(0, 8, 0.004)
 PHASE = 2 * np.pi * 0.5 * np.maximum(TIME - 1, 0)
@@ -33,6 +33,10 @@ TRIANGLE = 0.6 * 2 / np.pi * np.arcsin(np.sin(PHASE))
 def test_waves_are_named_where_sure(angle, frequency, wave):
     found = motion_of(TIME[TIME >= 1], angle[TIME >= 1])
     assert found == (frequency and pytest.approx(frequency, rel=1e-3), wave)
+
+
+def test_a_wave_that_a_search_finds_backwards_has_a_positive_frequency():
+    assert _best_fit(TIME, np.sin(2 * np.pi * 0.3 * TIME), np.sin, (-0.3, 0.0))[0] == pytest.approx(0.3)
 
 
 def test_a_wave_between_sine_and_triangle_has_a_frequency_only():

@@ -142,8 +142,8 @@ class Comparison:
             if candidate is not self.base:
                 by_law = log(settings.SAME_LAW), log(1 - settings.SAME_LAW)
                 complete = float(np.logaddexp(evidence.exact + by_law[0], evidence.other_law + by_law[1]))
-            # What an effect does to friction alone, which each recording has of its own, leaves no residuals. A trend is
-            # that of a listed mechanism.
+            # What an effect does to friction alone, which each recording has of its own, leaves no residuals. A trend
+            # is that of a listed mechanism.
             with np.errstate(divide="ignore"):
                 share = -settings.IN_FRICTION * np.expm1(log_factor_of_scatter(candidate))
                 in_friction = complete + np.log(share)

@@ -187,4 +187,5 @@ def _best_fit(time_s: NDArray, angle: NDArray, wave: Callable, start: Sequence[f
         return p[0] + p[1] * wave(2 * np.pi * p[2] * time + p[3]) - angle / scale
 
     found = least_squares(residual, [(angle.max() + angle.min()) / 2 / scale, 1.0, *start])
-    return float(found.x[2]), float(np.sqrt(np.mean(found.fun**2)) / max(abs(found.x[1]), 1e-9))
+    # A wave that runs backwards, the other way up, is the same one.
+    return abs(float(found.x[2])), float(np.sqrt(np.mean(found.fun**2)) / max(abs(found.x[1]), 1e-9))
