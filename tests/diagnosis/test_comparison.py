@@ -401,7 +401,7 @@ def test_friction_that_differs_between_recordings_is_something_unlisted(monkeypa
 
 @pytest.mark.parametrize("left, is_named", [(0.5, True), (0.02, False)])
 def test_a_drift_accounts_for_how_friction_differs(left, is_named, monkeypatch):
-    """`left` is the p-value of what it leaves of the scatter of friction."""
+    """`left` is the p-value of the scatter of friction about the drift."""
     p_values = {True: (left, 0.5), False: (1e-3, 1e-3)}
     monkeypatch.setattr(
         comparisons, "friction_p_values", lambda w, residuals, is_fitted: p_values[residuals == "drift"]

@@ -143,8 +143,8 @@ def test_a_tolerance_may_differ_by_channel():
     ],
 )
 def test_a_tolerance_that_cannot_be_used_is_refused(stated, said):
-    with pytest.raises(InputError, match=f"--tolerance: .*{said}"):
-        diagnosis_options(tolerance_of(stated), prefix="--")
+    with pytest.raises(InputError, match=f"tolerance: .*{said}"):
+        diagnosis_options(tolerance_of(stated))
 
 
 def test_the_configuration_for_the_public_recordings_says_how_they_would_be_diagnosed():

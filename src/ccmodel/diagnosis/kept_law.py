@@ -33,13 +33,13 @@ LOOK_ALIKES = {
 }
 
 
-def check_name(name: str, prefix: str = "") -> None:
+def check_name(name: str) -> None:
     """Raise `InputError` unless a new mechanism can have this name."""
     if NAME.fullmatch(name) is None or len(name) > LONGEST_NAME:
         wanted = f"at most {LONGEST_NAME} small letters, as in stick-in-seal"
-        raise InputError(f"{prefix}keep-law: {name!r} is no name of a mechanism: {wanted}")
+        raise InputError(f"keep-law: {name!r} is no name of a mechanism: {wanted}")
     if name in registry.names() or name in registry.laws():
-        raise InputError(f"{prefix}keep-law: {name} is a mechanism already; take another name")
+        raise InputError(f"keep-law: {name} is a mechanism already; take another name")
 
 
 def file_of(name: str) -> str:
