@@ -122,8 +122,8 @@ def tables(name):
 
 
 def content_of(files):
-    """Digest of files that no rule makes: one that takes the place of another may have an older date, which Snakemake
-    does not notice.
+    """Digest of files that are not made here. One that takes the place of another may have an older date, which
+    Snakemake does not notice.
     """
     return content_digest(of_inputs(map(Path, files))["sha256"])[:16]
 

@@ -30,7 +30,7 @@ from ccmodel.diagnosis.discrepancy import Discrepancy, Evidence, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis, laws_in
 from ccmodel.diagnosis.repeatability import (
     FRICTION,
-    OWN_FRICTION,
+    FRICTION_SCALE,
     friction_p_values,
     log_bayes_factor,
     scatter_p_value,
@@ -210,7 +210,7 @@ class Comparison:
         """
         further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
         share, smallest = self._left(candidate, part)
-        if any(registry.get(name).drift == OWN_FRICTION for name, _ in further):
+        if any(registry.get(name).drift == FRICTION_SCALE for name, _ in further):
             share = max(share, self._friction_left(candidate, part))
         if larger is not None and (without := self._without(larger, further)) is not None:
             share, smallest = min((share, smallest), self._left(larger, without))
@@ -525,7 +525,7 @@ def log_bayes_factor_of_repeats(candidate: CandidateFit) -> float:
 
 
 def log_factor_of_scatter(candidate: CandidateFit) -> float:
-    """The same that friction differs from run to run about its trend."""
+    """Logarithm of the least Bayes factor that friction differs about its trend as from run to run."""
     return log_bayes_factor(scatter_p_value(candidate.whitened, candidate.residuals, FRICTION in candidate.values))
 
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 FRICTION, PRETENSION = "friction_coefficient", "pretension_scale"
 # Parameter that is the friction of a single recording over the rig's.
-OWN_FRICTION = "friction_scale"
+FRICTION_SCALE = "friction_scale"
 _WORDS = {FRICTION: "friction", PRETENSION: "initial tension"}
 _CHANNEL_OF = {zero: channel for channel, zero in ZERO_OF.items()}
 
@@ -234,6 +234,7 @@ def _is_not_tested(whitened: Sequence["Whitened"]) -> bool:
 
 
 def _scatter(whitened: Sequence["Whitened"], found: Deviations, is_fitted: bool) -> float:
+    """P-value of the scatter within and between conditions."""
     groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
     tests = within_p_value(found, groups), between_p_value(found, groups, is_fitted)
     return corrected([p for p in tests if p is not None])

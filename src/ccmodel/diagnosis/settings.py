@@ -53,10 +53,9 @@ SAME_LOAD = 0.05
 # Fewest recordings whose scatter or trend is looked at, and the largest spread that their scatter, without repeats, may
 # give, over the stated one. Chosen: what differs from run to run by more is to be found, not to be allowed for.
 FEWEST_FOR_SCATTER, MOST_SCATTER = 4, 2.0
-# Log Bayes factor below which friction differs between recordings otherwise than from run to run, and deviation of a
-# recording's friction, over the stated spread, from which on a report names it. Chosen: odds of five (p = 0.018), and
-# four spreads, 4 %.
-FRICTION_SCATTERS, FRICTION_DEVIATES = -1.6, 4.0
+# Log Bayes factor below which friction differs between recordings otherwise than from run to run. Chosen: odds of five
+# (p = 0.018).
+FRICTION_SCATTERS = -1.6
 # Significance level of a trend of friction, about which scatter then counts. Chosen: a drift by 15 % over seven or more
 # recordings always has one.
 TREND_LEVEL = 0.002

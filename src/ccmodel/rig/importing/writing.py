@@ -104,7 +104,8 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Pro
     sources, remarks = recordings_of([Path(f) for f in files], stated)
     names = names_of([file for source in sources for file in source.files.values()])
     built = _build_all(sources, stated, names, within(progress, 0.0, BUILDING))
-    earlier, drafts = earlier_import(out), _is_to_be_drafted(out)
+    earlier = earlier_import(out)
+    drafts = _is_to_be_drafted(out, earlier)
     with new_folder(out) as fresh:
         fresh.mkdir()
         writing = each_of(built.items(), within(progress, BUILDING, 1.0), lambda one: f"writing {one[0]}")
@@ -267,9 +268,9 @@ def _sha256(path: Path) -> str:
     return file_digest(path)
 
 
-def _is_to_be_drafted(folder: Path) -> bool:
+def _is_to_be_drafted(folder: Path, earlier: Import | None) -> bool:
     """Whether a folder has no `batch.yaml`, or the draft of an import as it was drafted."""
-    file, earlier = folder / BATCH, earlier_import(folder)
+    file = folder / BATCH
     return not file.exists() or (earlier is not None and earlier.draft_sha256 == _sha256(file))
 
 
