@@ -22,7 +22,7 @@ from virtualrig.effect_march import (
 )
 from virtualrig.effects import Effects, laws, numbers, strand_settling
 from virtualrig.effects.presliding import BoucWenPresliding, DahlPresliding, IwanPresliding
-from virtualrig.effects.pulley_friction import PulleyFriction
+from virtualrig.effects.pulley_friction import PulleyFriction, under_pull
 from virtualrig.effects.unlisted_ageing_contact import FIRST_S, OLDEST_S
 from virtualrig.grid import Grid
 from virtualrig.trajectory import Preparation, Trajectory, check_tensions
@@ -246,6 +246,7 @@ def _stable_step(
     for law in laws("friction"):
         bristle = law.bound(physics, limit) * bristle
     radius = physics.radius * (1 - physics.load_share - physics.load_second)
+    in_bearing = under_pull(2 * limit, physics.bearing_share, physics.bearing_pull, physics.bearing_power)
     # Stiffness at the largest torque, at which each law alone would balance it.
     torque = physics.radius * limit
     beyond = np.cbrt(torque / physics.cubic) if physics.cubic else 0.0
@@ -254,7 +255,7 @@ def _stable_step(
         + physics.bumper
         + physics.detent * physics.detent_number
         + 3 * physics.cubic * beyond**2
-        + physics.bearing_torque / physics.bearing_angle
+        + physics.bearing_torque * in_bearing / physics.bearing_angle
         + physics.hysteresis_torque / physics.hysteresis_angle
     )
     spring, pulley_mass = torsion / radius**2 / 2, physics.inertia / (physics.radius * 2 - radius) ** 2 / 2
@@ -270,5 +271,5 @@ def _bearing_torque(theta: NDArray, friction: PulleyFriction | None, pull_N: NDA
     """Friction torque (N m) of a bearing along the angles `theta` (rad) under the pull of both cables."""
     if friction is None:
         return 0.0
-    load = pull_N / pull_N[0] if friction.law == "proportional" else 1.0
-    return friction.torque_Nm * load * bearing_course(theta, friction.presliding_rad)
+    factor = under_pull(pull_N, friction.share, friction.at_pull_N, friction.power)
+    return friction.torque_Nm * factor * bearing_course(theta, friction.presliding_rad)

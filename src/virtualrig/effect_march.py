@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from virtualrig.effects import Effects, cached, chained, numbers, strand_settling, stribeck
+from virtualrig.effects.pulley_friction import under_pull
 from virtualrig.effects.unlisted_ageing_contact import FIRST_S, OLDEST_S
 from virtualrig.effects.viscous_friction import REFERENCE_M_PER_S
 
@@ -268,7 +269,6 @@ def march(
     omega_out = 0.0
     bearing = 0.0
     bearing_torque = p.bearing_torque
-    start_pull = tension[0, nodes] + tension[1, nodes]
     hysteresis = 0.0
     travel = 0.0
     drive = 0.0
@@ -310,8 +310,9 @@ def march(
             load_radius = p.radius * roundness(theta_out, of_load)
             torque = load_radius * (tension[0, nodes] - tension[1, nodes])
             torque -= spring_torque(p, theta_out) + p.damping * omega_out
-            if p.bearing_is_proportional:
-                bearing_torque = p.bearing_torque * (tension[0, nodes] + tension[1, nodes]) / start_pull
+            if p.bearing_share > 0.0:
+                pull = tension[0, nodes] + tension[1, nodes]
+                bearing_torque = p.bearing_torque * under_pull(pull, p.bearing_share, p.bearing_pull, p.bearing_power)
             torque -= bearing_torque * bearing + p.hysteresis_torque * hysteresis
             omega_out += dt * torque / p.inertia
             theta_out += dt * omega_out

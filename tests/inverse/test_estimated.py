@@ -149,7 +149,17 @@ def test_a_law_that_was_learned_is_in_the_estimate(name):
     first, last, scale = LEARNED[name]
     law = laws()[name]
     coefficients = dict.fromkeys(law.coefficients, 0.0) | {law.coefficients[0]: 1.0}
-    acting = Active(name, law.place, {"first": first, "last": last, "scale": scale} | coefficients)
+    assert_is_in_the_estimate(Active(name, law.place, {"first": first, "last": last, "scale": scale} | coefficients))
+
+
+@pytest.mark.parametrize("place", ["drive-pulley", "load-pulley"])
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_friction_of_a_bearing_is_in_the_estimate(place, share):
+    assert_is_in_the_estimate(Active("pulley-friction", place, {"friction_torque": 4e-3, "share": share}))
+
+
+def assert_is_in_the_estimate(acting):
+    """That the load is estimated ten times as well with what acts as without."""
     rig = simulate(PAIR, SpringLoad(K_E), TIME_S, GROWING, EVEN, (acting,))
     read = recording(rig, GROWING, rig.read["tau_in_Nm"])
     with_law, without = (estimated(read, replace(PARAMETERS, mechanisms=some)) for some in ((acting,), ()))

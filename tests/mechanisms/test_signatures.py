@@ -338,6 +338,32 @@ def test_a_bearings_friction_builds_up_over_its_presliding_angle(place):
     assert extra == pytest.approx(torque * (1 - np.exp(-theta / presliding)), abs=1e-6)
 
 
+@pytest.mark.parametrize("share", [0.4, 1.0])
+@pytest.mark.parametrize("place", ["drive-pulley", "load-pulley"])
+def test_a_share_of_a_bearings_friction_is_in_proportion_to_the_cables_pull(place, share):
+    """It is 1 - share + share pull / (10 N) of the torque that is stated at 10 N."""
+    torque, presliding = 4e-3, 10e-3
+    values = {"friction_torque": torque, "presliding": presliding, "share": share}
+    drive = np.linspace(0, 3.0, 400)
+    r = run(drive, ("pulley-friction", place, values))
+    if place == "drive-pulley":
+        theta, pull, extra = drive, r.T1_N + r.T3_N, r.tau_in_Nm - (r.T1_N - r.T3_N) * R
+    else:
+        theta, pull, extra = r.theta_out_rad, r.T2_N + r.T4_N, (r.T2_N - r.T4_N) * R - r.tau_out_Nm
+    assert pull.max() > 1.3 * pull.min()
+    of_sliding = 1 - np.exp(-theta / presliding)
+    assert extra == pytest.approx(torque * (1 - share + share * pull / 10.0) * of_sliding, abs=1e-6)
+
+
+def test_a_plain_bearing_that_all_but_locks_the_load_is_solved():
+    """Its friction has a lever of 0.8 radii, so that the load hardly moves; one cable goes slack."""
+    values = {"friction_torque": 8.0 * R, "presliding": 2e-3, "share": 1.0}
+    r = run(6 * sine(), ("pulley-friction", "load-pulley", values))
+    assert r.T4_N.min() == 0.0
+    balance = (r.T2_N - r.T4_N) * R - K_E * r.theta_out_rad
+    assert (np.abs(balance) <= 0.8 * R * (r.T2_N + r.T4_N) * (1 + 1e-6)).all()
+
+
 def test_load_pulley_friction_is_a_step_absent_from_the_loads_torque():
     torque = 4e-3
     r = run(sine(), ("pulley-friction", "load-pulley", {"friction_torque": torque}))

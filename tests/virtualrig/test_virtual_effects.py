@@ -54,8 +54,11 @@ ALONE = {
     "settling-toe": {"strand_settling": {"law": "toe", "tension_scale_N": 3.0}},
     "knot": {"termination_compliance": {"load_m_per_N": 1e-4, "load_bedding_N": 3.0}},
     "closing-conduit": {"conduit_compliance_m_per_N": 6e-5, "conduit_closes_N": 2.0},
-    "plain-drive-bearing": {"drive_pulley": {"friction": {"law": "proportional", "torque_Nm": 4e-3}}},
-    "plain-load-bearing": {"load_pulley": {"friction": {"law": "proportional", "torque_Nm": 4e-3}}},
+    "plain-drive-bearing": {"drive_pulley": {"friction": {"torque_Nm": 4e-3, "share": 1.0, "at_pull_N": 15.0}}},
+    "plain-load-bearing": {"load_pulley": {"friction": {"torque_Nm": 4e-3, "share": 1.0, "at_pull_N": 15.0}}},
+    "palmgren-drive-bearing": {
+        "drive_pulley": {"friction": {"law": "palmgren", "torque_Nm": 4e-3, "share": 0.6, "at_pull_N": 15.0}}
+    },
     "two-lobes": {"load_pulley": {"eccentricity": {"share": 0.05, "second_share": 0.03, "second_phase_rad": 0.5}}},
     "soft-gap": {"load": {"half_gap_rad": 0.03, "soft_flank_rad": 0.01}},
     "exponential-spring": {"load": {"exponential_per_rad": 3.0}},
@@ -307,6 +310,26 @@ def test_bearings_show_where_they_are(coarse, recorded):
     np.testing.assert_allclose(load.tau_out_Nm[slip], spring[slip], atol=1e-4)
     across = coarse.rig.pulley_radius_m * (load.T2_N - load.T4_N) - load.tau_out_Nm
     np.testing.assert_allclose(across[slip], 4e-3, rtol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("name", "torque"),
+    [
+        ("plain-drive-bearing", lambda pull: 4e-3 * pull / 15.0),
+        ("palmgren-drive-bearing", lambda pull: 4e-3 * (0.4 + 0.6 * (pull / 15.0) ** (4 / 3))),
+    ],
+)
+def test_friction_of_a_drives_bearing_grows_with_the_cables_pull(coarse, recorded, name, torque):
+    ideal, t = recorded("none"), recorded(name)
+    slip = full_slip(t)
+    np.testing.assert_allclose((t.tau_in_Nm - ideal.tau_in_Nm)[slip], torque(t.T1_N + t.T3_N)[slip], rtol=1e-2)
+
+
+def test_friction_of_a_plain_bearing_at_the_load_is_between_cables_and_sensor(coarse, recorded):
+    t = recorded("plain-load-bearing")
+    slip = full_slip(t)
+    across = coarse.rig.pulley_radius_m * (t.T2_N - t.T4_N) - t.tau_out_Nm
+    np.testing.assert_allclose(across[slip], 4e-3 * (t.T2_N + t.T4_N)[slip] / 15.0, rtol=1e-2)
 
 
 def test_a_hysteretic_spring_shows_in_the_loads_torque(coarse, recorded):

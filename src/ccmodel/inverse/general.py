@@ -23,7 +23,7 @@ from ccmodel.inverse.update import (
 )
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.contract import Settings
-from ccmodel.mechanisms.pulley_friction import bearing
+from ccmodel.mechanisms.pulley_friction import bearing, torque_under
 from ccmodel.mechanisms.winding import Pulley, winding
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import imbalance, set_grip, set_memory
@@ -84,6 +84,13 @@ def _response(
 
 
 @kernel(error_model="numpy")
+def _in_bearing(ph: Physics, piece: NDArray, of_sliding: float) -> float:
+    """Friction torque of the drive pulley's bearing (N m) at a share of that of sliding."""
+    pull = max(piece[rows.TENSION, 0, 0], 0.0) + max(piece[rows.TENSION, 1, 0], 0.0)
+    return torque_under(pull, ph.drive_friction_Nm, ph.drive_friction_by_pull) * of_sliding
+
+
+@kernel(error_model="numpy")
 def filtered(
     ph: Physics,
     piece: NDArray,
@@ -97,6 +104,7 @@ def filtered(
     time_s: NDArray,
     theta_in: NDArray,
     measured: NDArray,
+    in_bearing: NDArray,
     noise_variance: NDArray,
     drive_variance: NDArray,
     considered: Considered,
@@ -110,7 +118,8 @@ def filtered(
     """Estimate the misfit of the load's law sample by sample, or run along a given one.
 
     Parameters as of `ccmodel.model.general.march.march` and `ccmodel.inverse.exact.filtered`, with torques (N m) and
-    angles (rad) for forces and displacements. `first_misfit` is the load's torque at rest where it has no law.
+    angles (rad) for forces and displacements. `in_bearing` is the friction of the drive pulley's bearing over that of
+    sliding, -1 to 1; `first_misfit` is the load's torque at rest where it has no law.
 
     Returns
     -------
@@ -167,6 +176,7 @@ def filtered(
                     response = 0.0
                 n = piece.shape[2] - 1
                 near = max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0)
+                on_cables = measured[j] - _in_bearing(ph, piece, in_bearing[j])
                 far = max(piece[rows.TENSION, 0, n], 0.0) - max(piece[rows.TENSION, 1, n], 0.0)
                 expected = lever * near
                 turn = theta_in[j] - theta_in[j - 1]
@@ -184,7 +194,7 @@ def filtered(
                 copy_slides(slide, KEPT_SLIDE, rows.NOW)
                 copy_means(mean, KEPT_MEAN, rows.MEAN_NEXT)
                 for _ in range(ITERATIONS if gain != 0.0 else 0):
-                    change = prior + gain * (measured[j] - expected + response * (misfit - prior)) - misfit
+                    change = prior + gain * (on_cables - expected + response * (misfit - prior)) - misfit
                     if abs(response * change) <= max(FOUND * np.sqrt(noise), SMALLEST_Nm):
                         break
                     misfit += change
@@ -213,7 +223,7 @@ def filtered(
         if not given:
             trace[MISFIT, j], trace[BY_MISFIT, j], trace[GAIN, j] = misfit, response, gain
             trace[GROWTH, j] = growth
-        trace[EXPECTED, j] = expected
+        trace[EXPECTED, j] = expected + _in_bearing(ph, piece, in_bearing[j])
         out[0, j], out[1, j] = load[rows.ANGLE], load[rows.TORQUE]
     return m
 
@@ -259,13 +269,12 @@ def run(
     trace, out = np.zeros((TRACE_ROWS, n)), np.empty((2, n))
     if misfit_Nm is not None:
         trace[MISFIT] = misfit_Nm
-    # The drive pulley's own bearing follows from its motion.
-    own = settings.drive_friction_Nm * bearing(theta_in, settings.drive_presliding_rad)
     solved = filtered(
         *at_rest._replace(slide=slide, mean=mean),
         time_s,
         theta_in,
-        drive.torque_Nm - own,
+        drive.torque_Nm,
+        bearing(theta_in, settings.drive_presliding_rad),
         noise,
         theta_variance,
         prior.considered,
@@ -278,7 +287,6 @@ def run(
     )
     if solved < n:
         raise ModelError(f"no balance of cables and load was found at sample {solved}")
-    trace[EXPECTED] += own
     if isinstance(load, TorqueLoad):  # the load's own torque, without what acts beside it
         out[1] = trace[MISFIT]
     return Run(trace, out, noise)

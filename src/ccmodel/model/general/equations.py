@@ -17,6 +17,7 @@ from ccmodel.kernel import kernel
 from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
 from ccmodel.mechanisms.presliding import MOST_ELEMENTS, dahl
+from ccmodel.mechanisms.pulley_friction import torque_under
 from ccmodel.mechanisms.relaxation import BRANCHES, lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
@@ -293,17 +294,19 @@ def _load(
         alpha = (a1 * (omega - load[rows.OMEGA]) - a2 * (load[rows.OMEGA] - load[rows.OMEGA_BEFORE])) / dt
         tau += ph.load_damping * omega + ph.inertia * alpha
         slope += (ph.load_damping + ph.inertia * a1 / dt) * a1 / dt
-    bearing = load[rows.BEARING]
+    near_A, near_B = max(piece[rows.TENSION, 0, n], 0.0), max(piece[rows.TENSION, 1, n], 0.0)
+    bearing, in_bearing = load[rows.BEARING], 0.0
     if ph.load_friction_Nm > 0.0:
         bearing, by_sliding = dahl(load[rows.BEARING], rotation, ph.load_presliding_rad)
-        slope += ph.load_friction_Nm * (by_sliding if rotation != 0.0 else 1.0 / ph.load_presliding_rad)
-    in_bearing = ph.load_friction_Nm * bearing
+        friction = torque_under(near_A + near_B, ph.load_friction_Nm, ph.load_friction_by_pull)
+        slope += friction * (by_sliding if rotation != 0.0 else 1.0 / ph.load_presliding_rad)
+        in_bearing = friction * bearing
     if ph.has_load_laws:
         # The first step only balances the start: elements begin there without a torque.
         travel = ph.load_pulley.radius_m * rotation if dt > 0.0 else 0.0
         torque_of_load, torque_in_bearing, by_laws = _laws_of_load(ph, load, theta, travel, omega, by_rotation)
         tau, in_bearing, slope = tau + torque_of_load, in_bearing + torque_in_bearing, slope + by_laws
-    difference = max(piece[rows.TENSION, 0, n], 0.0) - max(piece[rows.TENSION, 1, n], 0.0)
+    difference = near_A - near_B
     load[rows.OMEGA_NEXT], load[rows.BEARING_NEXT] = omega, bearing
     load[rows.TORQUE], load[rows.IN_BEARING] = tau, in_bearing
     return (

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.drive_train import train_torque
 from ccmodel.mechanisms.presliding import MOST_ELEMENTS, dahl
+from ccmodel.mechanisms.pulley_friction import torque_under
 from ccmodel.mechanisms.tables import keep_slip
 from ccmodel.mechanisms.winding import Pulley, winding, winding_change
 from ccmodel.model.general import layout as rows
@@ -175,9 +176,11 @@ def _at_drive_angle(
         ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, friction_factor, fixed_grip
     )
     R = drive.radius_m * winding(angle, drive)[1]
-    cables = R * (max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0))
+    T1, T3 = max(piece[rows.TENSION, 0, 0], 0.0), max(piece[rows.TENSION, 1, 0], 0.0)
+    cables = R * (T1 - T3)
     turned = angle - pulley[rows.DRIVE_ANGLE]
-    bearing = ph.drive_friction_Nm * dahl(pulley[rows.DRIVE_BEARING], turned, ph.drive_presliding_rad)[0]
+    friction = torque_under(T1 + T3, ph.drive_friction_Nm, ph.drive_friction_by_pull)
+    bearing = friction * dahl(pulley[rows.DRIVE_BEARING], turned, ph.drive_presliding_rad)[0]
     return solved, rotation, cables + bearing - train_torque(motor - angle, ph.train_compliance, ph.train_half_gap)
 
 

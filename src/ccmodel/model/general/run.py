@@ -14,7 +14,7 @@ from ccmodel.mechanisms.contract import Sensing, Settings
 from ccmodel.mechanisms.learned import end_spring
 from ccmodel.mechanisms.load_inertia import load_damping
 from ccmodel.mechanisms.presliding import Contacts
-from ccmodel.mechanisms.pulley_friction import bearing
+from ccmodel.mechanisms.pulley_friction import bearing, torque_under
 from ccmodel.mechanisms.relaxation import branch_times
 from ccmodel.mechanisms.tables import Table
 from ccmodel.mechanisms.winding import Pulley, pulley_of
@@ -235,7 +235,9 @@ def _marched(
         # The sensor does not feel what acts beside the measured torque: a spring, a mass, friction of the load.
         out[5, :solved] = np.broadcast_to(series, time_s.shape)[:solved]
     if settings.drive_friction_Nm != 0.0:
-        out[6, :solved] += settings.drive_friction_Nm * bearing(out[7, :solved], settings.drive_presliding_rad)
+        pull = out[0, :solved] + out[2, :solved]
+        friction = torque_under(pull, settings.drive_friction_Nm, settings.drive_friction_by_pull)
+        out[6, :solved] += friction * bearing(out[7, :solved], settings.drive_presliding_rad)
     return solved, out
 
 
