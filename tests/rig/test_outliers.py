@@ -55,6 +55,38 @@ def test_a_first_or_last_reading_may_be_impossible(at):
     assert outliers(values).tolist() == [at]
 
 
+SHORT = np.sin(np.linspace(0.0, 12.0, 400)) + 0.005 * NOISE[:400]
+
+
+@pytest.mark.parametrize("is_reversed", [False, True])
+@pytest.mark.parametrize("rows", [2, 3, 5, 8])
+@pytest.mark.parametrize("slope", [0.2, 0.4])
+def test_a_motion_that_is_steep_at_an_end_is_no_outlier(rows, slope, is_reversed):
+    values = SHORT.copy()
+    values[-rows:] = values[-rows - 1] + slope * np.arange(1, rows + 1)
+    values = values[::-1] if is_reversed else values
+    assert outliers(values).size == 0
+    assert frequent_outliers(values).size == 0
+
+
+@pytest.mark.parametrize("rows", [2, 3, 5])
+def test_a_motion_that_reverses_at_an_end_is_no_outlier(rows):
+    """The current of a drive falls within a few samples after a reversal, and stays there."""
+    values = SHORT.copy()
+    values[-rows:] = values[-rows - 1] - 0.9
+    assert outliers(values).size == 0
+
+
+@pytest.mark.parametrize("place", range(1, 6))
+@pytest.mark.parametrize("is_reversed", [False, True])
+def test_a_spike_in_a_motion_that_is_steep_at_an_end_is_found(place, is_reversed):
+    values = SHORT.copy()
+    values[-6:] = values[-7] + 0.2 * np.arange(1, 7)
+    values[-1 - place] += 2.0
+    values = values[::-1] if is_reversed else values
+    assert outliers(values).tolist() == [place if is_reversed else values.size - 1 - place]
+
+
 def test_readings_that_are_too_many_to_be_dropped_are_named():
     values = 2.3 * np.sin(3 * TIME) + 0.01 * NOISE
     at = np.arange(7, TIME.size, 80)

@@ -86,8 +86,9 @@ OUTSTANDING_FACTOR, OUTSTANDING_GRAINS, NEAR_SAMPLES = 2.5, 2.0, 12
 # many of its smallest steps. Practice: of 269 logs, 102 of them measured ones, none has a factor above 2.6.
 OUTLIER_NEIGHBOURS, OUTLIER_FACTOR, OUTLIER_SHARE, OUTLIER_GRAINS = 5, 4.0, 0.05, 5
 OUTLIER_RANGE = (0.005, 0.995)
-# The first and the last reading must be this many ranges from the median.
-OUTLIER_AT_ENDS = 4
+# At the ends of a log it is also beyond both adjacent readings by this share of that distance, or else this many ranges
+# from the median of the log. Chosen: beside a spike in a steep motion the share is up to a half.
+OUTLIER_SINGLE, OUTLIER_AT_ENDS = 2 / 3, 4
 # Share of a sensor's stated range by which a reading at its end may lie outside.
 BEYOND_RANGE = 0.01
 # Share of the samples up to which frequent outliers are looked for.

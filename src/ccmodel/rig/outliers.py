@@ -59,16 +59,17 @@ def without(table: pd.DataFrame, rows: NDArray) -> pd.DataFrame:
     return table[~rows] if rows.any() else table
 
 
-def _few(distance: NDArray, least: float) -> NDArray:
+def _few(distance: NDArray, least: float, is_judged: NDArray) -> NDArray:
     """Positions of impossible readings, ascending, from the `_distances` of all readings.
 
     They are farther from the median of their neighbours than all others are, by a factor. Whatever a rig does, from
     noise to a load that snaps, it does more than once in a recording or within several samples.
     """
-    return _standing_out(distance, max(int(limits.BAD_CELLS_FRACTION * distance.size), 1), least)
+    found = _standing_out(distance, max(int(limits.BAD_CELLS_FRACTION * distance.size), 1), least)
+    return found[is_judged[found]]
 
 
-def _many(values: NDArray, distance: NDArray, least: float) -> NDArray:
+def _many(values: NDArray, distance: NDArray, least: float, is_judged: NDArray) -> NDArray:
     """As `_few`, of readings that are more than a few: each is also far from the readings before and after it.
 
     A load that snaps again and again is not back in the next sample.
@@ -78,21 +79,36 @@ def _many(values: NDArray, distance: NDArray, least: float) -> NDArray:
     steps = np.abs(np.diff(values))
     # The first and the last reading have one neighbour, and may be part of another motion.
     single = np.minimum(np.append(steps, 0.0), np.insert(steps, 0, 0.0))
-    return _standing_out(np.minimum(distance, single), int(limits.MOST_OUTLIERS * values.size), least)
+    found = _standing_out(np.minimum(distance, single), int(limits.MOST_OUTLIERS * values.size), least)
+    return found[is_judged[found]]
 
 
-def _distances(values: NDArray) -> tuple[NDArray, float]:
-    """Distances from the median of the neighbours, and the least that counts; none where no step is large enough."""
+def _distances(values: NDArray) -> tuple[NDArray, float, NDArray]:
+    """Distances from the median of the neighbours, the least that counts, and which readings can be judged by them.
+
+    There are none where no step is large enough. At the ends of a log, readings on one side stand for both, and their
+    median lags behind a motion that is steep there or has just reversed. A reading there can be judged if it turns back
+    as a spike does, beyond both adjacent readings by most of the distance, or lies far from all the log.
+    """
     steps = np.abs(np.diff(values))
     low, high = np.quantile(values, limits.OUTLIER_RANGE)
     least = max(limits.OUTLIER_SHARE * (high - low), limits.OUTLIER_GRAINS * steps[steps > 0].min(initial=np.inf))
     if not (2 * steps > least).any():
-        return np.array([]), least
+        return np.array([]), least, np.array([], bool)
     distance = np.abs(values - median_filter(values, footprint=NEIGHBOURS, mode="mirror"))
     # A first or last reading may be part of a motion that the log has not, as in the public recordings.
     is_far = np.abs(values - np.median(values)) > limits.OUTLIER_AT_ENDS * (high - low)
     distance[[0, -1]] *= is_far[[0, -1]]
-    return distance, least
+    row = np.arange(values.size)
+    is_inside = np.minimum(row, row[::-1]) >= limits.OUTLIER_NEIGHBOURS
+    return distance, least, is_inside | is_far | (_beyond_adjacent(values) > limits.OUTLIER_SINGLE * distance)
+
+
+def _beyond_adjacent(values: NDArray) -> NDArray:
+    """How far each reading lies above or below both adjacent ones; zero for the first and the last, which have one."""
+    inner, before, after = values[1:-1], values[:-2], values[2:]
+    beyond = np.maximum(np.minimum(before, after) - inner, inner - np.maximum(before, after))
+    return np.pad(np.maximum(beyond, 0.0), 1)
 
 
 def _standing_out(distance: NDArray, most: int, least: float) -> NDArray:
