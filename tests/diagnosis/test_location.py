@@ -75,9 +75,12 @@ def test_a_place_that_there_was_no_time_to_isolate_is_said():
     found = replace(found, comparison=replace(found.comparison, evidence={found.calibrated.hypothesis: past}))
     said = report("b", found, found.calibrated, PARAMETERS, [], deadline=Deadline(at_s=0.0))
     assert said["location"]["place"] == "conduit"
+    assert (said["location"]["is_found"], said["location"]["places"]) == (False, [])
+    assert said["location"]["text"].startswith("The place was not looked for: a limit was reached before.")
     assert said["not_judged"][0]["what"] == "the place of the mismatch"
     in_time = report("b", found, found.calibrated, PARAMETERS, [])
     assert in_time["location"]["place"] == "drive-pulley"
+    assert in_time["location"]["is_found"]
     assert not in_time["not_judged"]
 
 

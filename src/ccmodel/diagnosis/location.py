@@ -40,7 +40,8 @@ def location(
 ) -> dict:
     """Most likely place of the mismatch and all possible ones, the calibration's worst channels and phases, a text.
 
-    Without `isolating`, a fault of one channel or of the load is not looked for.
+    Without `isolating`, a fault of one channel or of the load is not looked for. A mismatch that no mechanism explains
+    then has no possible place; readers of `place` get the one along which nearly every effect acts.
 
     Raises
     ------
@@ -49,9 +50,11 @@ def location(
     """
     if judgement.verdict == "agrees":
         text = "model and recordings agree within the noise"
-        return {"place": None, "places": [], "channels": [], "phases": [], "text": text}
+        return {"place": None, "is_found": False, "places": [], "channels": [], "phases": [], "text": text}
     hypothesis = judgement.best.hypothesis
-    places = hypothesis.places or judgement.single_fault_places or _places(judgement, deadline, isolating)
+    places = hypothesis.places or judgement.single_fault_places
+    if not places and isolating:
+        places = _places(judgement, deadline)
     table = mismatch(calibrated, judgement.whitened)
     square = {c: float(np.nanmean(np.square(list(phases.values())))) for c, phases in table.items()}
     channels = prominent(square, settings.NAMED_CHANNEL)
@@ -59,8 +62,15 @@ def location(
     by_phase = {p: float(np.nanmean(s)) for p, s in squares.items() if np.isfinite(s).any()}
     phases = sorted(prominent(by_phase, settings.NAMED_PHASE), key=PHASES.index)
     where = joined([TEXT[place] for place in places], "and" if hypothesis.acting else "or")
-    text = f"Most likely place: {where}. Largest errors: {joined(channels)}, {joined(phases)}."
-    return {"place": places[0], "places": list(places), "channels": channels, "phases": phases, "text": text}
+    text = f"Most likely place: {where}." if places else "The place was not looked for: a limit was reached before."
+    return {
+        "place": (*places, *BETWEEN)[0],
+        "is_found": bool(places),
+        "places": list(places),
+        "channels": channels,
+        "phases": phases,
+        "text": f"{text} Largest errors: {joined(channels)}, {joined(phases)}.",
+    }
 
 
 def prominent(square: dict[str, float], share: float) -> list[str]:
@@ -71,15 +81,14 @@ def prominent(square: dict[str, float], share: float) -> list[str]:
     return [name for name in ranked if beyond[name] > share**2 * worst] or ranked[:1]
 
 
-def _places(judgement: Judgement, deadline: Deadline, isolating: bool) -> list[str]:
+def _places(judgement: Judgement, deadline: Deadline) -> list[str]:
     """Possible places of a mismatch that no mechanism explains, the most likely first.
 
     If no part alone is at fault (`ccmodel.diagnosis.isolation`), the fault lies between drive and load, where nearly
     every effect acts along the conduits. Places that this does not separate are ordered by their screening scores.
     """
     whitened, calibrated = judgement.whitened, judgement.calibrated
-    isolated = isolate(whitened, calibrated, deadline) if isolating else [(np.inf, BETWEEN)]
-    least, places = min(isolated, default=(0.0, PLACES_OF[channels_of(whitened)[0]]))
+    least, places = min(isolate(whitened, calibrated, deadline), default=(0.0, PLACES_OF[channels_of(whitened)[0]]))
     possible = places if least <= settings.ISOLATED_SHARE * judgement.comparison.excess else BETWEEN
     scored = [s.hypothesis.acting[0][1] for s in judgement.scores if s.values]
     return list(dict.fromkeys([*(place for place in scored if place in possible), *possible]))

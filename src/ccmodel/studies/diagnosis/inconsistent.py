@@ -61,7 +61,14 @@ def _location(contradictions: Sequence[Finding]) -> dict:
     places = [f"{end}-sensor" for end in ends if end is not None and len(ends) == 1]
     where = f" {TEXT[places[0]]}" if places else ""
     text = f"The inputs contradict one another{where}; no model is given."
-    return {"place": places[0] if places else None, "places": places, "channels": [], "phases": [], "text": text}
+    return {
+        "place": places[0] if places else None,
+        "is_found": bool(places),
+        "places": places,
+        "channels": [],
+        "phases": [],
+        "text": text,
+    }
 
 
 def _end_of(column: str | None) -> str | None:
