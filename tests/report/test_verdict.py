@@ -240,8 +240,23 @@ def test_the_headline_of_a_small_effect_does_not_promise_a_smaller_error():
 
 def test_where_the_worst_error_stays_the_headline_names_the_one_that_falls_most():
     said = headline_of((9.0, 2.0), F_load=(3.9, 3.9), tau_out=(1.2, 1.1), tau_in=(3.5, 1.0))
-    assert said.endswith("the held-out error of τ_in falls from 3.5 to 1.0 times the noise floor.")
+    assert said.endswith(
+        "the held-out error of τ_in falls from 3.5 to 1.0 times the noise floor. That of F_load stays at 3.9 times the"
+        " noise floor."
+    )
     assert "of F_load falls from 3.9 to 3.5" in headline_of((9.0, 2.0), F_load=(3.9, 3.5), tau_in=(3.5, 1.0))
+
+
+def test_the_headline_says_in_which_channels_the_error_does_not_fall():
+    errors = {"tau_out": (9.0, 1.2), "tau_in": (3.0, 3.0), "F_load": (1.2, 1.9), "theta_out": (1.0, 1.4)}
+    said = headline_of((9.0, 2.0), **errors)
+    assert said.endswith(
+        "of τ_out falls from 9.0 to 1.2 times the noise floor. That of F_load rises from 1.2 to 1.9 and that of τ_in"
+        " stays at 3.0 times the noise floor."
+    )
+    assert "θ_out" not in said
+    small = headline_of((1.11, 1.05), F_load=(3.88, 3.9), tau_in=(1.5, 2.5))
+    assert "3.9 after. That of τ_in rises from 1.5 to 2.5 times the noise floor. The mean square" in small
 
 
 def test_the_nearest_model_is_never_said_without_its_label():

@@ -7,6 +7,7 @@ from math import floor, inf, isinf, log10
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE, symbol_of
 from ccmodel.diagnosis.formula import CONSTANT
+from ccmodel.diagnosis.settings import CONSPICUOUS
 from ccmodel.mechanisms.contract import (
     BEARING_TORQUE,
     CABLE_STRETCH,
@@ -140,22 +141,45 @@ def _gain(fit: Mapping) -> str:
     """How far the held-out error falls: of the worst channel, or else of the one in which it falls most.
 
     Where it falls in none, the mean square of the errors is stated, for which what differs from run to run is noise.
+    A further sentence names the channels in which it does not fall, if it is more than differences between runs.
     """
     worst, error = worst_channel(fit["error"]), error_name(fit)
     before, after = ({c: round(e[w] / e["noise"], 1) for c, e in fit["error"].items()} for w in ("before", "after"))
     falls = {channel: before[channel] - after[channel] for channel in before}
     most = worst if falls[worst] > 0.0 else max(falls, key=lambda channel: falls[channel])
+    rest = _remaining(before, after, most if falls[most] > 0.0 else worst)
     if falls[most] > 0.0:
         fall = f"falls from {before[most]:.1f} to {after[most]:.1f} times the noise floor"
-        return f"With this in the model, the {error} of {SYMBOL[most]} {fall}."
+        return f"With this in the model, the {error} of {SYMBOL[most]} {fall}.{rest}"
     changes = f"{before[worst]:.1f} times the noise floor before and {after[worst]:.1f} after"
     low, high = (f"{fit['mean_square'][model]:.2f}" for model in ("extended", "calibrated"))
     if not float(low) < float(high):
-        return f"The {error} of no channel falls; that of {SYMBOL[worst]} is {changes}."
+        return f"The {error} of no channel falls; that of {SYMBOL[worst]} is {changes}.{rest}"
     return (
-        f"The effect is smaller than the scatter between runs: the {error} of {SYMBOL[worst]} is {changes}."
+        f"The effect is smaller than the scatter between runs: the {error} of {SYMBOL[worst]} is {changes}.{rest}"
         f" The mean square of the residuals, for which this scatter is noise, falls from {high} to {low} (1: noise)."
     )
+
+
+def _remaining(before: Mapping[str, float], after: Mapping[str, float], named: str) -> str:
+    """A sentence on the other channels whose error does not fall and is above the noise floor; empty without any.
+
+    The noise floor includes what differs from run to run.
+
+    Parameters
+    ----------
+    before, after : mapping of str to float
+        Errors over the noise floor by channel, as they are printed.
+    named : str
+        The channel that the sentence before is about.
+    """
+    rest = [c for c in before if c != named and after[c] >= before[c] and after[c] > CONSPICUOUS]
+    changes = [
+        f"that of {SYMBOL[c]} "
+        + (f"rises from {before[c]:.1f} to {after[c]:.1f}" if after[c] > before[c] else f"stays at {after[c]:.1f}")
+        for c in sorted(rest, key=lambda c: before[c] - after[c])
+    ]
+    return f" {_capital(joined(changes))} times the noise floor." if changes else ""
 
 
 # What has a law of each slot; that of a sensor is named by its channel, and that of all channels of a side is a delay.
