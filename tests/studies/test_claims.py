@@ -365,6 +365,29 @@ def test_the_deadband_over_loads_by_hand(monkeypatch, rows, verdict):
     assert model_alone._load(CABLE, CLAIMS.model_copy(update={"model": model}), HOW).borne_out == verdict
 
 
+def claim_on_loads(monkeypatch, *values):
+    """The claim on the deadband over loads, from what is measured with each of them."""
+    measured = iter(values)
+    monkeypatch.setattr(model_alone, "measure", lambda *_: (next(measured), {}))
+    model = STUDY.model_copy(update={"load_stiffness_Nm_per_rad": [0.02, 0.05, 0.1][: len(values)]})
+    return model_alone._load(CABLE, CLAIMS.model_copy(update={"model": model}), HOW)
+
+
+def test_a_deadband_that_was_not_compared_between_loads_is_not_determined(monkeypatch):
+    taut, slack = ({"lost_motion": 1.0, "width": 1.0, "slack_share": share} for share in (0.0, 50.0))
+    one = claim_on_loads(monkeypatch, taut, slack)
+    assert one.borne_out == Verdict.OPEN
+    assert "Only with a spring of 0.02 N·m/rad does no cable go slack" in one.sentence
+    assert "was not compared between loads" in one.sentence
+    none = claim_on_loads(monkeypatch, {}, {})
+    assert (none.borne_out, none.sentence) == (Verdict.OPEN, "With no load was there a lost motion to compare.")
+    no_width = {"lost_motion": 1.0, "slack_share": 0.0}
+    without = claim_on_loads(monkeypatch, taut, no_width)
+    assert without.borne_out == Verdict.OPEN
+    assert "the loop's width was not compared" in without.sentence
+    assert claim_on_loads(monkeypatch, taut, no_width | {"lost_motion": 2.0}).borne_out == Verdict.NO
+
+
 @pytest.mark.parametrize(
     "lost, slopes, verdict",
     [

@@ -45,24 +45,34 @@ def _load(parameters: Parameters, claims: Claims, how: Measuring) -> Claim:
         if "slack_share" in values and "lost_motion" in values:
             (slack if values["slack_share"] > claims.seen_percent else taut).append((stiffness, values))
     changes = {q: spread_percent([v[q] for _, v in taut if q in v]) for q in ("lost_motion", "width")}
-    holds = bool(taut) and all(c is not None and c < claims.small_percent for c in changes.values())
+    compared = [change for change in changes.values() if change is not None]
     whole = spread_percent([v["lost_motion"] for _, v in taut + slack])
     verdict = Verdict.PART if whole is not None and whole > claims.small_percent else Verdict.YES
-    verdict = Verdict.OPEN if not taut else verdict if holds else Verdict.NO
+    if any(change >= claims.small_percent for change in compared):
+        verdict = Verdict.NO
+    elif len(compared) < len(changes):
+        verdict = Verdict.OPEN
     says = "the deadband depends on friction under pretension, not on the load"
     return Claim("deadband-and-load", "VI", says, verdict, _load_sentence(taut, slack, changes), rows)
 
 
 def _load_sentence(taut: list, slack: list, changes: dict) -> str:
     if not taut:
-        return "With every load a cable goes slack."
+        return "With every load a cable goes slack." if slack else "With no load was there a lost motion to compare."
     taut, slack = (sorted(rows, key=itemgetter(0)) for rows in (taut, slack))
     (soft, first), (stiff, _) = taut[0], taut[-1]
-    sentence = (
-        f"With springs of {soft:g} to {stiff:g} N·m/rad no cable goes slack: the lost motion is"
-        f" {first['lost_motion']:.4g} rad and changes by {percent(changes['lost_motion'])} %, the loop's width by"
-        f" {percent(changes['width'])} %."
-    )
+    lost, width = (None if c is None else f"{percent(c)} %" for c in (changes["lost_motion"], changes["width"]))
+    if lost is None:
+        sentence = (
+            f"Only with a spring of {soft:g} N·m/rad does no cable go slack: the lost motion is"
+            f" {first['lost_motion']:.4g} rad, and was not compared between loads."
+        )
+    else:
+        sentence = (
+            f"With springs of {soft:g} to {stiff:g} N·m/rad no cable goes slack: the lost motion is"
+            f" {first['lost_motion']:.4g} rad and changes by {lost}, the loop's width"
+            f" {f'by {width}' if width else 'was not compared'}."
+        )
     if slack:
         stiffness, values = slack[-1]
         sentence += (
