@@ -10,13 +10,20 @@ from typer.testing import CliRunner
 from ccmodel.cli import app
 from ccmodel.model.model_input import ModelInput
 from ccmodel.rig.batch import load_batch
-from ccmodel.rig.drafting import draft_batch
+from ccmodel.rig.drafting import draft_and_refuse
 from ccmodel.rig.importing.sources import names_of
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.sentences import controls_in
 from ccmodel.typed import InputError
 
 STEP = 2 * np.pi / 4096
+
+
+def draft_batch(folder):
+    """The file that is drafted."""
+    return draft_and_refuse(folder)[0]
+
+
 # What a person fills in, by key, wherever it is empty.
 KNOWN = {
     "pulley_radius_m": 0.006,

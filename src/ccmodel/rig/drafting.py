@@ -81,11 +81,6 @@ class _Log:
         return float(np.mean(found)) if found and len(rest) else None
 
 
-def draft_batch(folder: Path) -> Path:
-    """As `draft_and_refuse`; the file alone."""
-    return draft_and_refuse(folder)[0]
-
-
 def draft_and_refuse(folder: Path) -> tuple[Path, dict[str, str]]:
     """Write a `batch.yaml` with one entry for each log of a folder.
 

@@ -11,8 +11,9 @@ import pandas as pd
 import pytest
 from made_up_lab import counts, recording, write_text
 
-from ccmodel.rig import readers
-from ccmodel.rig.importing import import_files, write_guess
+from ccmodel.rig import drafting, readers
+from ccmodel.rig.imported import earlier_import
+from ccmodel.rig.importing import import_files, write_guess, writing
 from ccmodel.rig.importing.showing import next_of_import
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.rig.log import read_log
@@ -203,6 +204,28 @@ def with_a_gap(lab, name="gap"):
     lines = file.read_text().splitlines()
     file.write_text("\n".join([*lines[:500], *lines[2000:]]) + "\n")
     return file
+
+
+def test_nothing_that_was_just_written_is_read_again(lab, monkeypatch):
+    """A draft has read all logs; an import without one reads those that `batch.yaml` leaves out."""
+    read = []
+
+    def counted(path, *more):
+        read.append(path.name)
+        return read_log(path, *more)
+
+    monkeypatch.setattr(drafting, "read_log", counted)
+    monkeypatch.setattr(writing, "read_log", counted)
+    lab.run([lab.files[0], with_a_gap(lab)])
+    assert sorted(read) == ["gap.csv.gz", "one.csv.gz"]
+    draft = lab.batch / "batch.yaml"
+    draft.write_text(draft.read_text() + "# edited\n")
+    read.clear()
+    looked_at = []
+    monkeypatch.setattr(writing, "earlier_import", lambda f: looked_at.append(f) or earlier_import(f))
+    written = lab.run([lab.files[0], with_a_gap(lab)])
+    assert (read, written.unlisted, len(looked_at)) == (["gap.csv.gz"], [], 1)
+    assert any(remark.startswith("gap.csv.gz: not used") for remark in written.remarks)
 
 
 def test_a_log_that_no_batch_can_use_is_named_with_its_reason(lab):

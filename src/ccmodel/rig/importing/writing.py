@@ -18,7 +18,7 @@ from ccmodel.progress import Progress, each_of, silent, within
 from ccmodel.provenance import file_digest
 from ccmodel.rig.batch import NAMES, valid_name
 from ccmodel.rig.columns import TIME
-from ccmodel.rig.drafting import draft_batch, in_words
+from ccmodel.rig.drafting import draft_and_refuse, in_words
 from ccmodel.rig.findings import FileError, LogError
 from ccmodel.rig.imported import PROVENANCE, Import, earlier_import, imported_logs, listed_files, unlisted_logs
 from ccmodel.rig.importing.map import ImportMap, load_map
@@ -113,18 +113,21 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Pro
             _write_log(fresh / f"{id_}.csv.gz", one.table)
         (fresh / MAP).write_bytes(map_content)
         if drafts:
-            _draft(fresh, sources, names)
+            unusable = _draft(fresh, sources, names)
         else:
             shutil.copy2(out / BATCH, fresh / BATCH)
         draft_sha256 = _sha256(fresh / BATCH) if drafts else earlier and earlier.draft_sha256
         provenance = _provenance(fresh, sources, built, names, remarks) | {"draft_sha256": draft_sha256}
         text = json.dumps(provenance, indent=1, ensure_ascii=False)
         (fresh / PROVENANCE).write_text(text + "\n", encoding="utf-8")
-    unlisted = _unlisted(out)
-    unusable = _unusable(out, unlisted)
+    left, changed = [], []
+    if not drafts:
+        unlisted = _unlisted(out)
+        unusable = _unusable(out, unlisted)
+        left = [id_ for id_, file in unlisted.items() if file not in unusable]
+        changed = _changed({one["id"]: one["sha256"] for one in provenance["recordings"]}, earlier)
     remarks = remarks + [f"{file}: not used: {text}" for file, text in unusable.items()]
-    left = [id_ for id_, file in unlisted.items() if file not in unusable]
-    return Written(out, built, remarks, drafts, left, [] if drafts else _changed(out, earlier))
+    return Written(out, built, remarks, drafts, left, changed)
 
 
 def check_folder(out: Path) -> None:
@@ -164,7 +167,7 @@ def _unlisted(folder: Path) -> dict[str, str]:
 
 
 def _unusable(folder: Path, unlisted: dict[str, str]) -> dict[str, str]:
-    """Why no batch can use a log, by the file of the log. A draft leaves out these and no others."""
+    """Why no batch can use a log, by the file of the log."""
     reasons = {}
     for file in unlisted.values():
         try:
@@ -174,11 +177,10 @@ def _unusable(folder: Path, unlisted: dict[str, str]) -> dict[str, str]:
     return reasons
 
 
-def _changed(folder: Path, earlier: Import | None) -> list[str]:
-    """Recordings whose logs are not those of the import before."""
+def _changed(digests: dict[str, str], earlier: Import | None) -> list[str]:
+    """Recordings whose logs are not those of the import before, from the digests of the logs by id."""
     before = {log.id: log.sha256 for log in earlier.recordings if log.sha256} if earlier else {}
-    now = earlier_import(folder)
-    return [log.id for log in (now.recordings if now else []) if before.get(log.id, log.sha256) != log.sha256]
+    return [id_ for id_, digest in digests.items() if before.get(id_, digest) != digest]
 
 
 def _content(file: Path) -> bytes:
@@ -274,10 +276,16 @@ def _is_to_be_drafted(folder: Path, earlier: Import | None) -> bool:
     return not file.exists() or (earlier is not None and earlier.draft_sha256 == _sha256(file))
 
 
-def _draft(fresh: Path, sources: Sequence[Source], names: dict[Path, str]) -> None:
-    """Draft a `batch.yaml`; `InputError` on the files of the recordings if no log can be used."""
+def _draft(fresh: Path, sources: Sequence[Source], names: dict[Path, str]) -> dict[str, str]:
+    """Draft a `batch.yaml`, and say which logs no batch can use, and why.
+
+    Raises
+    ------
+    InputError
+        On the files of the recordings, if no log can be used.
+    """
     try:
-        draft_batch(fresh)
+        return draft_and_refuse(fresh)[1]
     except InputError as error:
         given = {f"{source.id}.csv.gz": names[next(iter(source.files.values()))] for source in sources}
         problems = [(given.get(Path(p.file).name), p.text) for p in error.problems]
