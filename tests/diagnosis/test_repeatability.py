@@ -7,6 +7,7 @@ import pytest
 
 import made_observations as made
 from ccmodel.diagnosis.candidate import fit
+from ccmodel.diagnosis.comparison import Comparison
 from ccmodel.diagnosis.hypothesis import PAPER
 from ccmodel.diagnosis.repeatability import (
     FRICTION,
@@ -15,6 +16,7 @@ from ccmodel.diagnosis.repeatability import (
     between_p_value,
     conditions,
     corrected,
+    deviating,
     deviations,
     estimated,
     friction_p_values,
@@ -27,7 +29,10 @@ from ccmodel.diagnosis.repeatability import (
     without_trend,
     zero_spread,
 )
+from ccmodel.diagnosis.result import deviating_friction
+from ccmodel.diagnosis.result import report as diagnosed
 from ccmodel.diagnosis.settings import MOST_SCATTER, SPREAD_FREEDOM, TREND_LEVEL
+from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.diagnosis.whitening import relinearised, whiten
 from ccmodel.inference.observations import Observations
 
@@ -219,6 +224,49 @@ def test_friction_that_drifts_does_not_repeat(drift, repeats):
     refitted = fit(again, PAPER, found.free, found.values)
     scatter, trend = friction_p_values(again, refitted.residuals, True)
     assert (scatter > SCATTER_LEVEL and trend > TREND_LEVEL) == repeats
+
+
+def test_the_friction_of_a_recording_that_deviates_is_said():
+    for ratio, said in ((0.88, "12 % lower"), (1.12, "12 % higher")):
+        ratios = [1.0, 1.0, 1.0, ratio, 1.0, 1.0, 1.0]
+        recordings = with_frictions(*ratios)
+        found, repeatability = calibrated(recordings)
+        again = [relinearised(w, found.model(made.PARAMETERS), repeatability) for w in recordings]
+        refitted = fit(again, PAPER, found.free, found.values)
+        agrees = Judgement("agrees", refitted, Comparison(again, refitted, [], {}), [], [], [])
+        (entry,) = diagnosed("b", agrees, refitted, made.PARAMETERS, [])["not_judged"]
+        assert entry["what"] == again[3].observations.id
+        percent, higher = float(entry["why"].split()[3]), said.split()[2]
+        assert percent == pytest.approx(12.0, abs=1.5)
+        assert f"% {higher} than in the others" in entry["why"]
+        assert "check its bend" in entry["why"]
+
+
+def test_no_friction_is_said_to_deviate_if_it_differs_as_from_run_to_run():
+    recordings = with_frictions(1.01, 0.99, 1.0, 0.985, 1.015, 1.0, 1.0)
+    found, repeatability = calibrated(recordings)
+    again = [relinearised(w, found.model(made.PARAMETERS), repeatability) for w in recordings]
+    assert deviating_friction(fit(again, PAPER, found.free, found.values)) == []
+
+
+def test_recordings_that_deviate_from_the_others_are_few_and_clearly_apart():
+    rest = np.random.default_rng(0).standard_normal(12)
+    for size in (0, 1, 2, 3):
+        values = rest.copy()
+        values[:size] += 12.0
+        assert deviating(observed(values)) == list(range(size))
+    # Half of them are no exceptions to the other half, and neither is a wide scatter.
+    assert deviating(observed([12.0, -12.0] * 6)) == []
+    assert deviating(observed(5 * rest)) == []
+    assert deviating(observed([12.0, *[np.nan] * 11])) == []
+    # What the errors of the estimates account for is no deviation.
+    assert deviating(observed([6.0, *rest[1:]])) == [0]
+    assert deviating(observed([6.0, *rest[1:]], variance=9.0)) == []
+
+
+def test_recordings_are_rarely_said_to_deviate_from_run_to_run():
+    draws = np.random.default_rng(1).standard_normal((2000, 9))
+    assert 0 < np.mean([bool(deviating(observed(d))) for d in draws]) < 0.02
 
 
 def test_the_report_says_what_was_assumed():

@@ -281,6 +281,53 @@ def between_p_value(found: Deviations, groups: Sequence[Sequence[int]], is_fitte
     return fisher_tail(ratio, between_freedom, settings.SPREAD_FREEDOM + freedom)
 
 
+def friction_of_deviating(whitened: Sequence["Whitened"], residuals: Sequence[NDArray]) -> dict[str, float]:
+    """Relative difference of friction from that of the others, by id of the recordings in which it is clear.
+
+    Parameters as of `friction_p_values`. A trend is no difference. See `deviating`.
+    """
+    found = without_trend(deviations(whitened, residuals, FRICTION), sequences(whitened))
+    if not (apart := deviating(found)):
+        return {}
+    ratios = 1.0 + found.values * [_stated_share(w) for w in whitened]
+    others = float(np.nanmean(np.delete(ratios, apart)))
+    return {whitened[i].observations.id: float(ratios[i] / others) - 1.0 for i in apart}
+
+
+def _stated_share(w: "Whitened") -> float:
+    """Stated standard deviation of a recording's friction over the friction itself; NaN without it."""
+    shares = (sd / value for name, value, sd in w.scalar_nuisances if name == FRICTION)
+    return next(shares, np.nan) / w.repeatability.ratio(FRICTION)
+
+
+def deviating(found: Deviations) -> list[int]:
+    """Numbers of the recordings in which a nuisance deviates clearly from that in the others.
+
+    The generalised extreme studentised deviate test: the recording farthest from the others is set aside, then the next
+    one, up to the share `settings.MOST_DEVIATING`. Those up to the last that is significantly far from the rest deviate
+    (Rosner 1983, Technometrics 25(2), 165-172, doi:10.1080/00401706.1983.10487848). The spread of the rest is estimated
+    with the stated one as prior, and the level is corrected for the number of recordings.
+    """
+    rest = np.flatnonzero(np.isfinite(found.values)).tolist()
+    aside: list[int] = []
+    count = 0
+    for _ in range(int(settings.MOST_DEVIATING * len(rest))):
+        p_values = [_p_value_of_one(found, i, [j for j in rest if j != i]) for i in rest]
+        aside.append(rest.pop(int(np.argmin(p_values))))
+        if corrected(p_values) < settings.FRICTION_DEVIATES:
+            count = len(aside)
+    return sorted(aside[:count])
+
+
+def _p_value_of_one(found: Deviations, one: int, others: list[int]) -> float:
+    """Two-sided p-value of the deviation in one recording from the mean of others, if it is from run to run."""
+    square, freedom, _ = found.sum_of_squares([others])
+    variance = _posterior(square, freedom) ** 2 * (1 + 1 / len(others))
+    variance += found.variances[one] + found.variances[others].mean() / len(others)
+    apart = abs(found.values[one] - found.values[others].mean())
+    return 2 * student_tail(float(apart / np.sqrt(variance)), settings.SPREAD_FREEDOM + freedom)
+
+
 def sequences(whitened: Sequence["Whitened"]) -> list[list[int]]:
     """Numbers of the recordings of each batch, in the order in which they were made, or else are listed."""
     batches: dict[str, list[int]] = {}

@@ -10,6 +10,7 @@ from ccmodel.channels import short_name, unit_of
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import experiment, location, repeatability, settings
 from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift, fit
+from ccmodel.diagnosis.comparison import log_factor_of_scatter
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.law_report import laws_of
 from ccmodel.diagnosis.observations import NotJudged
@@ -76,7 +77,13 @@ def report(
         },
         "repeatability": repeatability.report(whitened),
         "next_experiment": experiment.proposed(judgement, estimates) if is_open else None,
-        "not_judged": [*not_judged, *contradicting_recording(judgement), *_at_bounds(best), *failures],
+        "not_judged": [
+            *not_judged,
+            *contradicting_recording(judgement),
+            *deviating_friction(best),
+            *_at_bounds(best),
+            *failures,
+        ],
     }
 
 
@@ -247,6 +254,20 @@ def contradicting_recording(judgement: Judgement) -> NotJudged:
         " file"
     )
     return [{"what": whitened[worst].observations.id, "why": why}]
+
+
+def deviating_friction(candidate: CandidateFit) -> NotJudged:
+    """Recordings whose friction deviates from that of the others, if it differs by more than from run to run."""
+    if log_factor_of_scatter(candidate) > settings.FRICTION_SCATTERS:
+        return []
+    return [
+        {
+            "what": id_,
+            "why": f"its friction is {abs(100 * share):.2g} % {'higher' if share > 0 else 'lower'} than in the others,"
+            " and more than from run to run: check its bend against the batch file",
+        }
+        for id_, share in repeatability.friction_of_deviating(candidate.whitened, candidate.residuals).items()
+    ]
 
 
 def _at_bounds(candidate: CandidateFit) -> NotJudged:

@@ -56,6 +56,10 @@ FEWEST_FOR_SCATTER, MOST_SCATTER = 4, 2.0
 # Log Bayes factor below which friction differs between recordings otherwise than from run to run. Chosen: odds of five
 # (p = 0.018).
 FRICTION_SCATTERS = -1.6
+# Where it does: significance level, corrected for the number of recordings, at which the friction of one deviates from
+# that of the others, and the largest share of the recordings that may. Chosen: with more, it is not clear which ones
+# the others are.
+FRICTION_DEVIATES, MOST_DEVIATING = 0.01, 0.25
 # Significance level of a trend of friction, about which scatter then counts. Chosen: a drift by 15 % over seven or more
 # recordings always has one.
 TREND_LEVEL = 0.002
