@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from typer.testing import CliRunner
 
 from ccmodel import mechanisms as registry
-from ccmodel.channels import TABLE_ONE
+from ccmodel.channels import PAPER_TABLE_ONE, TABLE_ONE
 from ccmodel.cli import app
 from ccmodel.diagnosis.hypothesis import single_mechanisms
 from ccmodel.studies.table_one import rank
@@ -42,6 +42,13 @@ def written(folder, **changes):
     file = folder / "table-one.yaml"
     file.write_text(yaml.safe_dump(settings))
     return file
+
+
+def test_the_errors_of_the_papers_table_stand_in_one_place(tmp_path):
+    assert "pattern_percent" not in yaml.safe_load(COMMITTED.read_text())
+    assert STUDY.pattern_percent == PAPER_TABLE_ONE
+    others = {channel: 1.0 for channel in TABLE_ONE}
+    assert load_yaml_model(written(tmp_path, pattern_percent=others), TableOne).pattern_percent == others
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from pydantic import BaseModel
 
-from ccmodel.channels import CHANNELS, TABLE_ONE, symbol_of
+from ccmodel.channels import CHANNELS, PAPER_TABLE_ONE, symbol_of
 from ccmodel.mechanisms import catalogue, names
 from ccmodel.outputs import new_file
 from ccmodel.progress import Progress, each_of, silent, within
@@ -31,8 +31,6 @@ LEFT_OUT = "left-out.json"
 READ, COLLECTED = 0.1, 0.7
 # Kinds of studies in the order of the page.
 ORDER = ("baseline", "accuracy", "loops", "claims", "phases")
-# Table I of the paper, %: its fitted model against its own half-loop recording.
-PAPER_TABLE_I = dict(zip(TABLE_ONE, (3.7, 19.4, 3.7, 12.8, 4.1, 9.9, 5.5), strict=True))
 
 
 @dataclass(frozen=True)
@@ -268,7 +266,7 @@ def _errors(content: Content) -> dict:
         "channels": channels,
         "summary": _summary(errors, channels),
         "table_one": list(_beside_table_one(content)),
-        "paper": PAPER_TABLE_I,
+        "paper": PAPER_TABLE_ONE,
         "rows": errors.to_dict("records"),
     }
 
@@ -282,7 +280,7 @@ def _beside_table_one(content: Content) -> Iterable[dict]:
         fitted_to = set(fit.get("recordings", ()))
         errors = content.errors[content.errors["parameters"] == fit["fit"]]
         errors = errors[(errors["batch"] + "/" + errors["recording"]).isin(fitted_to)]
-        if fit["succeeded"] and set(PAPER_TABLE_I) <= set(errors["channel"]):
+        if fit["succeeded"] and set(PAPER_TABLE_ONE) <= set(errors["channel"]):
             means = {
                 name: (100 * errors["rmse"] / errors[norm]).groupby(errors["channel"]).mean()
                 for name, norm in (("peak to peak", "peak_to_peak"), ("maximum", "maximum"), ("rms", "rms"))

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ccmodel.channels import TABLE_ONE
+from ccmodel.channels import PAPER_TABLE_ONE, TABLE_ONE
 from ccmodel.typed import NotNegative, OneOf, Positive, TypedModel
 
 Some = Annotated[list[Positive], Field(min_length=1)]
@@ -87,9 +87,11 @@ class Pairs(TypedModel):
 
 
 class TableOne(TypedModel):
-    """The whole study."""
+    """The whole study; the errors that it looks for are those of the paper's table, if no others are stated."""
 
-    pattern_percent: dict[Annotated[str, OneOf(TABLE_ONE)], Positive]
+    pattern_percent: dict[Annotated[str, OneOf(TABLE_ONE)], Positive] = Field(
+        default_factory=lambda: dict(PAPER_TABLE_ONE)
+    )
     rounding_percent: Positive
     rig: Rig
     not_stated: NotStated
