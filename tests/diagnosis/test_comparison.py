@@ -15,6 +15,7 @@ from ccmodel.diagnosis.comparison import Comparison, imitation, log_priors, prio
 from ccmodel.diagnosis.discrepancy import Evidence
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.laws import Proposal
+from ccmodel.diagnosis.repeatability import FrictionPValues
 from ccmodel.diagnosis.result import alternatives_of
 from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.selection import Selection, contenders, lower
@@ -67,8 +68,8 @@ SINGLES = [(90.0, KINK, -100.0), (95.0, SCALE, -110.0), (80.0, FRICTION, -120.0)
 @pytest.fixture(autouse=True)
 def repeats(monkeypatch):
     """Friction that differs between recordings as from run to run."""
-    monkeypatch.setattr(comparisons, "friction_p_values", lambda whitened, residuals, is_fitted: (0.5, 0.5))
-    monkeypatch.setattr(comparisons, "scatter_p_value", lambda whitened, residuals, is_fitted: 0.5)
+    same = FrictionPValues(0.5, 0.5, 0.5)
+    monkeypatch.setattr(comparisons, "friction_p_values", lambda whitened, residuals, is_fitted: same)
 
 
 def fitted(mean_square, *acting, **values):
@@ -380,7 +381,7 @@ def test_friction_that_does_not_repeat_speaks_against_a_candidate(monkeypatch):
     monkeypatch.setattr(
         comparisons,
         "friction_p_values",
-        lambda w, residuals, is_fitted: (0.5, 1e-6 if residuals == "trend" else 0.5),
+        lambda w, residuals, is_fitted: FrictionPValues(0.5, 1e-6 if residuals == "trend" else 0.5, 0.5),
     )
     drifts = replace(fitted(1.0, FRICTION), residuals="trend")
     found = verdict(evidence(), (drifts, evidence(NONE)), (fitted(1.0, SCALE), evidence(NONE)))
@@ -394,19 +395,18 @@ DRIFT = ("friction-drift", "conduit")
 def test_friction_that_differs_between_recordings_is_something_unlisted(monkeypatch):
     """It leaves no residuals, since each recording has a friction of its own."""
     assert verdict(evidence(NONE), model=fitted(1.0)).verdict == "agrees"
-    monkeypatch.setattr(comparisons, "friction_p_values", lambda w, residuals, is_fitted: (1e-3, 0.5))
-    monkeypatch.setattr(comparisons, "scatter_p_value", lambda w, residuals, is_fitted: 1e-3)
+    scatters = FrictionPValues(1e-3, 0.5, 1e-3)
+    monkeypatch.setattr(comparisons, "friction_p_values", lambda w, residuals, is_fitted: scatters)
     assert verdict(evidence(NONE), model=fitted(1.0)).verdict == "unexplained"
 
 
 @pytest.mark.parametrize("left, is_named", [(0.5, True), (0.02, False)])
 def test_a_drift_accounts_for_how_friction_differs(left, is_named, monkeypatch):
     """`left` is the p-value of the scatter of friction about the drift."""
-    p_values = {True: (left, 0.5), False: (1e-3, 1e-3)}
+    p_values = {True: FrictionPValues(left, 0.5, left), False: FrictionPValues(1e-3, 1e-3, left)}
     monkeypatch.setattr(
         comparisons, "friction_p_values", lambda w, residuals, is_fitted: p_values[residuals == "drift"]
     )
-    monkeypatch.setattr(comparisons, "scatter_p_value", lambda w, residuals, is_fitted: left)
     values = {"friction-drift/conduit/change": 0.15}
     drift = replace(fitted(1.0, DRIFT, **values), residuals="drift")
     found = verdict(evidence(NONE - 20, size=1.0), (drift, evidence(NONE)), model=fitted(2.0))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import made_observations as made
+from ccmodel.diagnosis import repeatability
 from ccmodel.diagnosis.candidate import fit
 from ccmodel.diagnosis.comparison import Comparison
 from ccmodel.diagnosis.hypothesis import PAPER
@@ -222,8 +223,9 @@ def test_friction_that_drifts_does_not_repeat(drift, repeats):
     assert found.mean_square < 1.5
     again = [relinearised(w, found.model(made.PARAMETERS), repeatability) for w in recordings]
     refitted = fit(again, PAPER, found.free, found.values)
-    scatter, trend = friction_p_values(again, refitted.residuals, True)
-    assert (scatter > SCATTER_LEVEL and trend > TREND_LEVEL) == repeats
+    p = friction_p_values(again, refitted.residuals, True)
+    assert (p.scatter > SCATTER_LEVEL and p.trend > TREND_LEVEL) == repeats
+    assert p.about_trend > SCATTER_LEVEL
 
 
 def test_the_friction_of_a_recording_that_deviates_is_said():
@@ -267,6 +269,18 @@ def test_recordings_that_deviate_from_the_others_are_few_and_clearly_apart():
 def test_recordings_are_rarely_said_to_deviate_from_run_to_run():
     draws = np.random.default_rng(1).standard_normal((2000, 9))
     assert 0 < np.mean([bool(deviating(observed(d))) for d in draws]) < 0.02
+
+
+def test_the_deviations_of_friction_are_estimated_once_for_all_tests(monkeypatch):
+    recordings = with_frictions(1.0, 1.01, 0.99, 1.0)
+    found, _ = calibrated(recordings)
+    calls = []
+    monkeypatch.setattr(repeatability, "deviations", lambda *given: calls.append(1) or deviations(*given))
+    p = friction_p_values(recordings, found.residuals, True)
+    assert (len(calls), p.about_trend) == (1, p.scatter)
+    comparison = Comparison(recordings, found, [], {})
+    assert comparison.friction[found.hypothesis] == comparison.friction[found.hypothesis] == p
+    assert len(calls) == 2
 
 
 def test_the_report_says_what_was_assumed():

@@ -31,9 +31,8 @@ from ccmodel.diagnosis.hypothesis import Hypothesis, laws_in
 from ccmodel.diagnosis.repeatability import (
     FRICTION,
     FRICTION_SCALE,
+    FrictionPValues,
     friction_p_values,
-    log_bayes_factor,
-    scatter_p_value,
 )
 from ccmodel.diagnosis.whitening import Whitened
 
@@ -133,7 +132,8 @@ class Comparison:
         """
         found = []
         for candidate in [self.base, *self.candidates]:
-            evidence, repeats = self.evidence[candidate.hypothesis], self.log_repeats[candidate.hypothesis]
+            evidence, friction = self.evidence[candidate.hypothesis], self.friction[candidate.hypothesis]
+            repeats = friction.log_factor
             priors = log_priors(candidate.hypothesis.size, self._alike)
             # What no list holds is any law of any slot.
             unlisted = log((1 - settings.PRIOR_LISTED) / settings.PRIOR_LISTED)
@@ -145,7 +145,7 @@ class Comparison:
             # What an effect does to friction alone, which each recording has of its own, leaves no residuals. A trend
             # is that of a listed mechanism.
             with np.errstate(divide="ignore"):
-                share = -settings.IN_FRICTION * np.expm1(log_factor_of_scatter(candidate))
+                share = -settings.IN_FRICTION * np.expm1(friction.log_factor_about_trend)
                 in_friction = complete + np.log(share)
             incomplete = np.logaddexp(evidence.incomplete + repeats, in_friction)
             weights = np.array([complete + repeats, incomplete]) + priors
@@ -235,17 +235,17 @@ class Comparison:
 
         It is measured by the logarithm of the Bayes factor, which residuals do not show.
         """
-        after, before = (self.log_repeats[c.hypothesis] for c in (candidate, part))
+        after, before = (self.friction[c.hypothesis].log_factor for c in (candidate, part))
         return min(after / before, 1.0) if before < 0.0 else 0.0
 
     @cached_property
-    def log_repeats(self) -> dict[Hypothesis, float]:
-        """`log_bayes_factor_of_repeats` of the base and of each candidate."""
-        return {c.hypothesis: log_bayes_factor_of_repeats(c) for c in [self.base, *self.candidates]}
+    def friction(self) -> dict[Hypothesis, FrictionPValues]:
+        """`friction_of` the base and each candidate."""
+        return {c.hypothesis: friction_of(c) for c in [self.base, *self.candidates]}
 
     def is_good(self, candidate: CandidateFit) -> bool:
         """Whether a candidate's fit is good, and friction differs between recordings as from run to run."""
-        return candidate.is_good and self.log_repeats[candidate.hypothesis] > settings.FRICTION_SCATTERS
+        return candidate.is_good and self.friction[candidate.hypothesis].log_factor > settings.FRICTION_SCATTERS
 
     def _without(self, candidate: CandidateFit, members: set[tuple[str, str]]) -> CandidateFit | None:
         """The fitted candidate of the same mechanisms but for some; None if they were not fitted."""
@@ -515,18 +515,12 @@ def priors_of_further(has_part: bool, is_law: bool = False, laws_tried: bool = F
     return found / found.sum()
 
 
-def log_bayes_factor_of_repeats(candidate: CandidateFit) -> float:
-    """Logarithm of the least Bayes factor that friction differs between recordings as from run to run.
+def friction_of(candidate: CandidateFit) -> FrictionPValues:
+    """P-values of how friction differs between recordings under a candidate.
 
     Whitening keeps friction that differs from run to run out of the residuals, and so may keep out too much.
     """
-    tests = friction_p_values(candidate.whitened, candidate.residuals, FRICTION in candidate.values)
-    return sum(map(log_bayes_factor, tests))
-
-
-def log_factor_of_scatter(candidate: CandidateFit) -> float:
-    """Logarithm of the least Bayes factor that friction differs about its trend as from run to run."""
-    return log_bayes_factor(scatter_p_value(candidate.whitened, candidate.residuals, FRICTION in candidate.values))
+    return friction_p_values(candidate.whitened, candidate.residuals, FRICTION in candidate.values)
 
 
 def _rank(candidate: CandidateFit) -> tuple[bool, float]:

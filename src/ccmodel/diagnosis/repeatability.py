@@ -21,7 +21,7 @@ a standard normal prior is an observation m / (1 - v) with the variance v / (1 -
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -201,10 +201,33 @@ def _posterior(square: float, freedom: int) -> float:
     return float(np.sqrt((settings.SPREAD_FREEDOM + square) / (settings.SPREAD_FREEDOM + freedom)))
 
 
-def friction_p_values(
-    whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool
-) -> tuple[float, float]:
-    """P-values of the scatter and of the trend of friction, under the hypothesis that it differs as from run to run.
+class FrictionPValues(NamedTuple):
+    """P-values of how friction differs between recordings, under the hypothesis that it does as from run to run.
+
+    Attributes
+    ----------
+    scatter, trend : float
+    about_trend : float
+        Of the scatter about the trend; of the scatter if there is no trend.
+    """
+
+    scatter: float = 1.0
+    trend: float = 1.0
+    about_trend: float = 1.0
+
+    @property
+    def log_factor(self) -> float:
+        """Logarithm of the least Bayes factor of the hypothesis, from scatter and trend."""
+        return log_bayes_factor(self.scatter) + log_bayes_factor(self.trend)
+
+    @property
+    def log_factor_about_trend(self) -> float:
+        """The same, from the scatter about the trend alone."""
+        return log_bayes_factor(self.about_trend)
+
+
+def friction_p_values(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool) -> FrictionPValues:
+    """P-values of friction; 1 for fewer than four recordings or with a tolerance, which friction takes up some of.
 
     Parameters
     ----------
@@ -214,23 +237,13 @@ def friction_p_values(
     is_fitted : bool
         Whether the fit determines the mean friction; otherwise deviations count from the model's friction.
     """
-    if _is_not_tested(whitened):
-        return 1.0, 1.0
-    found = deviations(whitened, residuals, FRICTION)
-    return _scatter(whitened, found, is_fitted), trend_p_value(found, sequences(whitened))
-
-
-def scatter_p_value(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool) -> float:
-    """P-value of the scatter of friction about its trend; parameters as of `friction_p_values`."""
-    if _is_not_tested(whitened):
-        return 1.0
-    found = without_trend(deviations(whitened, residuals, FRICTION), sequences(whitened))
-    return _scatter(whitened, found, is_fitted)
-
-
-def _is_not_tested(whitened: Sequence["Whitened"]) -> bool:
-    """Whether there are too few recordings, or a tolerance, which friction takes up some of."""
-    return len(whitened) < settings.FEWEST_FOR_SCATTER or any(w.observations.tolerance.any() for w in whitened)
+    if len(whitened) < settings.FEWEST_FOR_SCATTER or any(w.observations.tolerance.any() for w in whitened):
+        return FrictionPValues()
+    found, runs = deviations(whitened, residuals, FRICTION), sequences(whitened)
+    about_trend = without_trend(found, runs)
+    scatter = _scatter(whitened, found, is_fitted)
+    rest = scatter if about_trend is found else _scatter(whitened, about_trend, is_fitted)
+    return FrictionPValues(scatter, trend_p_value(found, runs), rest)
 
 
 def _scatter(whitened: Sequence["Whitened"], found: Deviations, is_fitted: bool) -> float:

@@ -10,7 +10,7 @@ from ccmodel.channels import short_name, unit_of
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import experiment, location, repeatability, settings
 from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift, fit
-from ccmodel.diagnosis.comparison import log_factor_of_scatter
+from ccmodel.diagnosis.comparison import friction_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.law_report import laws_of
 from ccmodel.diagnosis.observations import NotJudged
@@ -258,7 +258,7 @@ def contradicting_recording(judgement: Judgement) -> NotJudged:
 
 def deviating_friction(candidate: CandidateFit) -> NotJudged:
     """Recordings whose friction deviates from that of the others, if it differs by more than from run to run."""
-    if log_factor_of_scatter(candidate) > settings.FRICTION_SCATTERS:
+    if friction_of(candidate).log_factor_about_trend > settings.FRICTION_SCATTERS:
         return []
     return [
         {
