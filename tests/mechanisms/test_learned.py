@@ -228,6 +228,22 @@ def test_friction_by_the_drives_angle_is_the_same_in_both_cables():
     np.testing.assert_allclose(factor[:, 0], 1 + 0.5 * theta, atol=0.02)
 
 
+def test_an_error_of_the_drives_encoder_is_taken_from_the_motion():
+    """The model driven by the reading, with the law of its error, is the one driven by the true angle."""
+    law = laws()["learned-sensor-map-theta-in-by-reading-fine"]
+    read = sine()
+    knots = np.linspace(read.min(), read.max(), len(law.basis))
+    z = np.linalg.lstsq(0.05 * law.basis, 0.03 * np.sin(3 * knots), rcond=None)[0]
+    ends = {"first": knots[0], "last": knots[-1], "scale": 0.05}
+    acting = Active(law.name, law.place, ends | dict(zip(law.coefficients, z.tolist(), strict=True)))
+    error = np.interp(read, *law.at_knots(acting.values))
+    assert np.abs(error).max() > 0.02
+    # The drive is where the cables have their initial tension at the start.
+    found, wanted = run(read, (acting,)), run(read - (error - error[0]))
+    for name in ("T1_N", "T2_N", "T3_N", "T4_N", "theta_out_rad", "tau_in_Nm"):
+        np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), atol=2e-4, err_msg=name)
+
+
 @pytest.mark.parametrize(("first", "last"), [(-0.3, 1.4), (-1.05, 1.0), (-1.0, 1.0)])
 def test_two_laws_of_a_pulleys_radius_are_their_sum_at_every_angle(first, last):
     names = "learned-pulley-radius-drive-by-drive-angle", "learned-pulley-radius-drive-by-drive-angle-fine"

@@ -72,7 +72,7 @@ def proposals(
     nothing = NormalEquations.of(base).log_evidence
     mass = _missing_mass(base, known)
     motions = each(base.whitened, lambda i, w: _motion(base, i))
-    channels = {c for w in base.whitened for c in w.observations.channels}
+    channels = {THETA_IN}.union(*(w.observations.channels for w in base.whitened))
     found = []
     for law in every:
         if deadline.has_passed:

@@ -113,6 +113,8 @@ CONTACT_ELEMENTS = Form(
     "friction over that of sliding, after a reversal", "1", neutral=1.0, is_centred=False, shortest_yield=0.002
 )
 ADDED = Form("added to {symbol}, in {unit}")
+# The drive's angle is an input of the model, not a reading that it predicts.
+ADDED_TO_INPUT = Form("added to {symbol}, which drives the model, in {unit}")
 # A mass: an inertia is one number.
 IN_PROPORTION = replace(ADDED, in_proportion=True)
 # A load without mass on which less acts as it moves faster has no balance but a jump.

@@ -71,6 +71,7 @@ from ccmodel.mechanisms.law_arguments import (
 from ccmodel.mechanisms.law_forms import (
     ADDED,
     ADDED_BEND,
+    ADDED_TO_INPUT,
     ADDED_TO_SUM,
     AGAINST_MOTION,
     CONSTANT_DRAG,
@@ -343,6 +344,7 @@ _SETTING_OF = {
     ADDED_BEND: "added_bend",
     IN_BEARING: "bearing_by_speed",
     ELEMENTS_IN_BEARING: "bearing_elements",
+    ADDED_TO_INPUT: "drive_angle_error",
 }
 # Settings of the solver by slot and argument, or by slot for laws of the drive's motion; and those whose neutral value
 # is not None.
@@ -412,6 +414,10 @@ def _slip(travel: NDArray, yields: NDArray) -> NDArray:
     return states
 
 
+def _reading(channel: str) -> Argument:
+    return Argument("reading", unit_of(channel), f"the reading of {symbol_of(channel)}", reading_of(channel))
+
+
 def _laws() -> Iterator[Law]:
     drive, load = of_motion(THETA_IN, "drive"), of_motion(THETA_OUT, "load")
     for argument in (DIRECTION, CABLE, LOG_SPEED, DWELL, TRAVEL, TIME, drive["angle"], TENSION, POSITION):
@@ -436,8 +442,8 @@ def _laws() -> Iterator[Law]:
     yield Law(LOAD, "load", load["acceleration"], IN_PROPORTION, TAU_OUT)
     yield Law(BEARING_TORQUE, "load-pulley", load["speed"], IN_BEARING)
     yield Law(BEARING_TORQUE, "load-pulley", load["since"], ELEMENTS_IN_BEARING)
+    yield Law(SENSOR_MAP, "drive-sensor", _reading(THETA_IN), ADDED_TO_INPUT, THETA_IN)
     for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD, THETA_OUT):
-        reading = Argument("reading", unit_of(channel), f"the reading of {symbol_of(channel)}", reading_of(channel))
         place = next(p for p in PLACES_OF[channel] if p.endswith("-sensor"))
         # A map of tau_in by its angle is a torque of the drive pulley, and theta_out is an angle itself.
         others = {
@@ -446,7 +452,7 @@ def _laws() -> Iterator[Law]:
             TAU_OUT: [load["angle"]],
         }
         form = ADDED_TO_SUM if channel in (F_DRIVE, F_LOAD) else ADDED
-        for argument in (reading, TIME, rate_of(channel), *others.get(channel, [])):
+        for argument in (_reading(channel), TIME, rate_of(channel), *others.get(channel, [])):
             yield Law(SENSOR_MAP, place, argument, form, channel)
     for place in ("drive-sensor", "load-sensor"):
         yield Law(SENSOR_MAP, place, TIME, DELAY)

@@ -1,7 +1,8 @@
-"""How much cable a pulley winds, for a radius that changes with its angle.
+"""How much cable a pulley winds, for a radius that changes with its angle, or an encoder that errs.
 
 The radius is R (1 + e sin(theta + psi) + f(theta)), with the eccentricity e of a bore and a table f of any shape. The
-cables' travel is the integral of this radius over the angle.
+cables' travel is the integral of this radius over the angle. Of an encoder that reads the angle theta + g at theta + g,
+the travel is shorter by R g, and the radius is not concerned.
 """
 
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from ccmodel.mechanisms.tables import Table
 
 
 class Pulley(NamedTuple):
-    """A pulley's radius by its angle.
+    """A pulley's radius by its angle, and the error of the angle.
 
     Attributes
     ----------
@@ -25,6 +26,8 @@ class Pulley(NamedTuple):
     knots_rad, added, added_rad : ndarray, shape (knots,)
         Angles at the knots of f, its values there, and its integral from the first knot; empty without f, which is
         piecewise linear between knots and constant beyond them.
+    read_rad, error_rad : ndarray, shape (knots of g,)
+        Readings of the encoder at the knots of g, and its values there; likewise.
     """
 
     radius_m: float
@@ -33,16 +36,29 @@ class Pulley(NamedTuple):
     knots_rad: NDArray
     added: NDArray
     added_rad: NDArray
+    read_rad: NDArray
+    error_rad: NDArray
 
 
-def pulley_of(radius_m: float, eccentricity: float, phase_rad: float, factor: Table | None) -> Pulley:
-    """An eccentric pulley; `factor` is 1 + f, none if not given."""
-    if factor is None:
-        return Pulley(float(radius_m), float(eccentricity), float(phase_rad), np.zeros(0), np.zeros(0), np.zeros(0))
-    # The march is compiled for contiguous arrays.
-    x, f = np.ascontiguousarray(factor.knots), np.ascontiguousarray(factor.values - 1.0)
-    integral = np.concatenate([[0.0], np.cumsum(np.diff(x) * (f[1:] + f[:-1]) / 2)])
-    return Pulley(float(radius_m), float(eccentricity), float(phase_rad), x, f, integral)
+def pulley_of(
+    radius_m: float, eccentricity: float, phase_rad: float, factor: Table | None, error: Table | None = None
+) -> Pulley:
+    """An eccentric pulley; `factor` is 1 + f and `error` g, none if not given."""
+    x, f = _arrays(factor)
+    f -= 1.0
+    integral = np.concatenate([np.zeros(min(x.size, 1)), np.cumsum(np.diff(x) * (f[1:] + f[:-1]) / 2)])
+    return Pulley(float(radius_m), float(eccentricity), float(phase_rad), x, f, integral, *_arrays(error))
+
+
+def _arrays(table: Table | None) -> tuple[NDArray, NDArray]:
+    """Copies of a table's knots and values, empty without a table; the march is compiled for contiguous arrays."""
+    return (np.zeros(0), np.zeros(0)) if table is None else (np.array(table.knots), np.array(table.values))
+
+
+@kernel
+def _error(theta: float, pulley: Pulley) -> float:
+    """The error g of the encoder where it reads theta."""
+    return np.interp(theta, pulley.read_rad, pulley.error_rad) if pulley.read_rad.size else 0.0
 
 
 @kernel
@@ -64,6 +80,7 @@ def winding(theta: float, pulley: Pulley) -> tuple[float, float, float]:
     """Cable travel over R (rad), from any zero; the radius over R, and the derivative of the latter by the angle."""
     e, psi = pulley.eccentricity, pulley.phase_rad
     travel, factor, slope = theta - e * np.cos(theta + psi), 1.0 + e * np.sin(theta + psi), e * np.cos(theta + psi)
+    travel -= _error(theta, pulley)
     if pulley.knots_rad.size:
         added_rad, added, by_angle = _added(theta, pulley)
         return travel + added_rad, factor + added, slope + by_angle
@@ -75,6 +92,8 @@ def winding_change(theta: float, rotation: float, pulley: Pulley) -> float:
     """Cable travel over R (rad) of a rotation from theta; by the bore without cancellation for a small one."""
     e, psi = pulley.eccentricity, pulley.phase_rad
     change = rotation + 2.0 * e * np.sin(theta + psi + 0.5 * rotation) * np.sin(0.5 * rotation)
+    if pulley.read_rad.size:
+        change -= _error(theta + rotation, pulley) - _error(theta, pulley)
     if pulley.knots_rad.size:
         change += _added(theta + rotation, pulley)[0] - _added(theta, pulley)[0]
     return change

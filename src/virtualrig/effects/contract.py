@@ -76,7 +76,7 @@ POINTS = 129
 # Fields of a side that a sensor reads, by the argument of its map; and the channels of both sides.
 SIDE = {"angle": "angle_rad", "torque": "torque_Nm", "force": "force_N"}
 CHANNELS = {
-    "drive": {"torque": "tau_in_Nm", "force": "F_drive_N"},
+    "drive": {"angle": "theta_in_rad", "torque": "tau_in_Nm", "force": "F_drive_N"},
     "load": {"angle": "theta_out_rad", "torque": "tau_out_Nm", "force": "F_load_N"},
 }
 

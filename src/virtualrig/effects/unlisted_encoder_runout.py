@@ -26,7 +26,7 @@ def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> 
 TWIN = Twin(
     name="unlisted-encoder-runout",
     fields={"sensors": {"angle_runout_rad": (float, 0.0), "angle_runout_phase_rad": (float, 0.0)}},
-    places=("load-sensor",),
+    places=("drive-sensor", "load-sensor"),
     size=(3e-3, 6e-2),
     unit="rad",
     seed=_seed,

@@ -420,9 +420,10 @@ def _physics(
 
 
 def pulley_at(settings: Settings, end: str, radius_m: float) -> Pulley:
-    """The pulley of an end, "drive" or "load", whose radius may change with its angle."""
+    """The pulley of an end, "drive" or "load", whose radius may change with its angle; the drive's angle is read."""
     by_bore = getattr(settings, f"{end}_eccentricity"), getattr(settings, f"{end}_eccentricity_rad")
-    return pulley_of(radius_m, *by_bore, getattr(settings, f"{end}_radius_factor"))
+    error = settings.drive_angle_error if end == "drive" else None
+    return pulley_of(radius_m, *by_bore, getattr(settings, f"{end}_radius_factor"), error)
 
 
 def _contacts(settings: Settings) -> tuple[Contacts, bool]:
