@@ -447,6 +447,18 @@ def test_a_law_with_memory_is_a_sum_of_maxwell_slip_elements():
     np.testing.assert_allclose(up, -down, atol=1e-12)
 
 
+@pytest.mark.parametrize("slot", ["bearing-torque", "load"])
+def test_the_curve_of_a_law_with_memory_is_half_of_its_rise_since_a_reversal(slot):
+    """Of Dahl's law, which takes no longer after a reversal than from rest, elements fit the former in most samples."""
+    law = laws()[f"learned-{slot}-by-distance-since-reversal"]
+    x, y = law.at_knots(values_of(law, z1=1.0) | {"first": 0.01, "last": 1.0})
+    back = np.concatenate([np.linspace(0.0, 3.0, 50), 3.0 - x])
+    sensing = Sensing(np.arange(back.size) * 0.01, {THETA_IN: back, TAU_IN: 0 * back}, 1.0, 1.0)
+    torque = law.added(sensing, x, y)
+    np.testing.assert_allclose(law.shown(x) @ y, (torque[49] - torque[50:]) / 2, rtol=1e-12)
+    np.testing.assert_allclose(law.behind(x, law.shown(x, law.determined_at(x)) @ y), y, atol=1e-12)
+
+
 def test_a_law_of_the_sliding_distance_is_a_sum_of_elements_at_every_contact():
     """With the shares of the mechanism's elements at its knots, it acts and looks as the mechanism does."""
     law = laws()["learned-sliding-friction-by-distance-since-reversal"]

@@ -123,7 +123,7 @@ RISING = replace(ADDED, rises=True)
 ADDED_TO_SUM = Form("added to {symbol}, in {unit}", is_centred=False)
 # A torque whose elements yield one after the other. A ball bearing's yield within a few hundredths of a millimetre.
 AGAINST_MOTION = Form(
-    "added to {symbol}, against the motion, as it builds up from rest, in {unit}",
+    "added to {symbol}, against the motion: half of its rise since a reversal, in {unit}",
     is_centred=False,
     shortest_yield=0.002,
 )
@@ -131,7 +131,7 @@ AGAINST_MOTION = Form(
 IN_BEARING = Form("torque of the {side} pulley's bearing on the cables, in N m", "N m", rises=True)
 ELEMENTS_IN_BEARING = replace(
     AGAINST_MOTION,
-    meaning="torque of the {side} pulley's bearing, against its motion, as it builds up from rest, in N m",
+    meaning="torque of the {side} pulley's bearing, against its motion: half of its rise since a reversal, in N m",
     unit="N m",
 )
 

@@ -233,18 +233,23 @@ class Law:
     def shown(self, x: NDArray, at: NDArray | None = None) -> NDArray:
         """What its curve shows of its values at the knots `x`, at the knots or at others, shape (arguments, knots).
 
-        Of a torque with memory it is what builds up from rest, and of the contacts what they lack of sliding friction
-        after a reversal from sliding; otherwise these values.
+        Of a torque with memory it is half of its rise since a reversal, which recordings show more often than a start
+        from rest, and of the contacts what they lack of sliding friction after a reversal from sliding; otherwise these
+        values.
         """
         if not self.form.has_elements:
             return np.eye(len(x))
-        built_up = np.minimum((x if at is None else at)[:, None] / x, 1.0)
+        yields = x if self.form is CONTACT_ELEMENTS else 2.0 * x
+        built_up = np.minimum((x if at is None else at)[:, None] / yields, 1.0)
         return -2.0 * (1.0 - built_up) if self.form is CONTACT_ELEMENTS else built_up
 
     def determined_at(self, x: NDArray) -> NDArray:
         """Arguments at which its curve determines its values at the knots, shape (knots,)."""
         # The first element has yielded at its knot, and nothing yields beyond the last one.
-        return np.concatenate([[x[0] / 2], x[:-1]]) if self.form is CONTACT_ELEMENTS else x
+        if self.form is CONTACT_ELEMENTS:
+            return np.concatenate([[x[0] / 2], x[:-1]])
+        # After a reversal an element takes twice the travel that it takes from rest.
+        return 2.0 * x if self.form.has_elements else x
 
     def behind(self, x: NDArray, curve: NDArray) -> NDArray:
         """Its values at the knots, from its curve at `determined_at`; both of shape (knots,)."""

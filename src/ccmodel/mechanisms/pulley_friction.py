@@ -53,8 +53,8 @@ def _by_speed(omega: NDArray, values: Mapping[str, float]) -> NDArray:
     return values["friction_torque"] * np.tanh(omega / values["reversal"])
 
 
-def _from_rest(travel: NDArray, values: Mapping[str, float]) -> NDArray:
-    """Torque by the travel of the pulley's rim from rest."""
+def _since_reversal(travel: NDArray, values: Mapping[str, float]) -> NDArray:
+    """Half of the torque's rise since a reversal, by the travel of the pulley's rim; of Dahl's law also from rest."""
     return -values["friction_torque"] * np.expm1(-travel / values["travel"])
 
 
@@ -62,7 +62,10 @@ _FRICTION = Parameter("friction_torque", "N m", 0.5e-3, 50e-3, 5e-3, "friction t
 # A reversal at 0.1 to 100 rad/s^2 through the angles of presliding; and these on rims of 3 to 100 mm.
 _REVERSAL = Parameter("reversal", "rad/s", 0.01, 1.0, 0.1, "speed at which friction has built up after a reversal")
 _TRAVEL = Parameter("travel", "m", 1.5e-6, 2e-3, 1e-4, "travel over which friction builds up")
-_BY_MOTION = ("speed", _by_speed, (_FRICTION, _REVERSAL)), ("distance-since-reversal", _from_rest, (_FRICTION, _TRAVEL))
+_BY_MOTION = (
+    ("speed", _by_speed, (_FRICTION, _REVERSAL)),
+    ("distance-since-reversal", _since_reversal, (_FRICTION, _TRAVEL)),
+)
 
 MECHANISM = Mechanism(
     name="pulley-friction",
