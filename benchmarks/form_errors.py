@@ -22,7 +22,7 @@ from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.run import Calibration, calibrate
 from ccmodel.diagnosis.screening import screen
-from ccmodel.diagnosis.whitening import relinearised
+from ccmodel.diagnosis.whitening import Whitened, relinearised
 from ccmodel.inference.pool import set_threads
 from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch
@@ -82,9 +82,13 @@ def fitted(calibrated: Calibration, hypothesis: Hypothesis) -> CandidateFit:
     base, free = calibrated.fit, calibrated.tested.free
     (score,) = screen(base, [hypothesis]).singles()
     found = fit(calibrated.whitened, hypothesis, free, base.values | (score.values or hypothesis.start))
+    return fit(about_itself(found), hypothesis, free, found.values)
+
+
+def about_itself(found: CandidateFit) -> list[Whitened]:
+    """The observations of a candidate with their covariance linearised about it."""
     spreads = estimated(found.whitened, found.residuals)
-    about = [relinearised(w, found.model(w.observations.parameters, w.session), spreads) for w in found.whitened]
-    return fit(about, hypothesis, free, found.values)
+    return [relinearised(w, found.model(w.observations.parameters, w.session), spreads) for w in found.whitened]
 
 
 def rows(effects: Sequence[str], number: int, cores: int) -> Iterator[dict]:

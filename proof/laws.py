@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from proof.intervals import bootstrap, count
 from proof.outcome import DECISION_THRESHOLD, Outcome, is_law_of, is_located
@@ -78,22 +79,44 @@ def inside(o: Outcome) -> float | None:
     law, truth = law_in_slot(o), _truth(o)
     if law is None or law["arguments"] != [truth["argument"]]:
         return None
-    return share_inside(law["curve"], truth)
+    return share_inside(law["curve"], truth, o.key["rig"]["Ke"])
 
 
-def share_inside(curve: Sequence[Sequence[float]], truth: Mapping) -> float | None:
+def share_inside(curve: Sequence[Sequence[float]], truth: Mapping, spring_Nm_per_rad: float) -> float | None:
     """Share of a curve's points within the range of the true law at which the true law is inside its band.
 
     The true law has what a calibration absorbs as the curve has it: a factor of a factor, an average of what is added,
-    and a slope of what is added by an angle.
+    a slope of what is added by an angle, and the zero of the load's angle.
     """
     x, y, low, high = np.array(curve).T
     true_x, true_y = np.array(truth["curve"]).T
+    if (truth["slot"], truth["argument"]) == ("load", "load-angle"):
+        true_x, true_y = by_angle_from_its_zero(true_x, true_y, x, y, spring_Nm_per_rad)
     visited = (x >= true_x[0]) & (x <= true_x[-1])
     if not visited.any():
         return None
     true = absorbed(np.interp(x, true_x, true_y)[visited], x[visited], y[visited], truth)
     return float(np.mean((true >= low[visited]) & (true <= high[visited])))
+
+
+def by_angle_from_its_zero(
+    true_x: NDArray, true_y: NDArray, x: NDArray, y: NDArray, spring_Nm_per_rad: float
+) -> tuple[NDArray, NDArray]:
+    """A load's true law by its angle, from the zero at which its average is that of the curve `y` at `x`.
+
+    The encoder has no zero of its own. From another zero, a spring's torque has a constant part, and no average of the
+    law is learned: the model's load has its zero where it needs none. All arrays are of shape (n,).
+    """
+
+    def excess(shift: float) -> float:
+        inside = (x + shift >= true_x[0]) & (x + shift <= true_x[-1])
+        if not inside.any():
+            return spring_Nm_per_rad * shift
+        return float(np.mean(np.interp(x[inside] + shift, true_x, true_y) - y[inside]) + spring_Nm_per_rad * shift)
+
+    reach = float(np.ptp(true_x)) / 2
+    shift = brentq(excess, -reach, reach) if excess(-reach) * excess(reach) < 0 else 0.0
+    return true_x - shift, true_y + spring_Nm_per_rad * shift
 
 
 def absorbed(true: NDArray, x: NDArray, y: NDArray, truth: Mapping) -> NDArray:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proof.laws import absorbed, inside, is_confidently_wrong_law, is_slot_right, score_of_laws
+from proof.laws import absorbed, inside, is_confidently_wrong_law, is_slot_right, score_of_laws, share_inside
 from proof.outcome import Outcome
 
 X = np.linspace(0.5, 12.0, 9)
@@ -14,7 +14,8 @@ X = np.linspace(0.5, 12.0, 9)
 def answer(kind="unlisted", name="unlisted-yielding-liner", slot="sliding-friction", argument="tension", y=None):
     curve = [] if y is None else np.column_stack([np.linspace(0.1, 15, 60), y(np.linspace(0.1, 15, 60))]).tolist()
     truth = {"name": name, "place": "conduit", "slot": slot, "argument": argument, "curve": curve, "severity": 2}
-    return {"case": "case-1", "kind": kind, "protocol": "rich", "recorded": "rich", "truth": [truth]}
+    rig = {"Ke": 0.05}
+    return {"case": "case-1", "kind": kind, "protocol": "rich", "recorded": "rich", "truth": [truth], "rig": rig}
 
 
 def law(y, sd=0.02, **changed):
@@ -57,6 +58,23 @@ def test_only_a_law_of_an_angle_has_its_slope_from_the_calibration(argument, exp
     key = answer(slot="bearing-torque", argument=argument, y=lambda x: 2e-3 * np.sin(x))
     learned = law(lambda x: 2e-3 * np.sin(x) + 0.01 * x - 0.3, sd=1e-5, slot="bearing-torque", arguments=[argument])
     assert inside(outcome(key, learned)) == pytest.approx(expected, abs=0.2)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.08])
+def test_a_loads_angle_has_its_zero_from_the_calibration(shift):
+    """A spring with detents from another zero: its constant torque is a shift of the angle, and the rest is the law."""
+    spring, angle = 0.05, np.linspace(-0.5, 0.5, 25)
+    true_x = np.linspace(-0.6, 0.6, 129)
+
+    def detents(a):
+        return 2e-3 * (np.sin(12 * a + 1.2) - np.sin(1.2))
+
+    seen = spring * shift + detents(angle + shift) - 0.01 * angle
+    curve = np.column_stack([angle, seen, seen - 5e-5, seen + 5e-5])
+    truth = {"slot": "load", "argument": "load-angle", "curve": list(zip(true_x, detents(true_x), strict=True))}
+    assert share_inside(curve, truth, spring) == 1.0
+    other = np.column_stack([angle, np.sin(9 * angle), seen - 5e-5, seen + 5e-5])
+    assert share_inside(other, truth, spring) < 0.5
 
 
 def test_a_radius_has_no_slope_from_the_calibration():
