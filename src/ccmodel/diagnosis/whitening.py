@@ -55,7 +55,7 @@ class Whitened:
         One minus the posterior variance of each scalar nuisance over its prior variance.
     noise_floor : dict of str to float
         Root mean square error of a correct model by channel, in its unit: sensor noise, uncertain drive motion,
-        friction from run to run, and the tolerance.
+        the tolerance, and what differs from run to run: friction, the initial tension, zeros and states.
     scalar_nuisances : sequence of (str, float, float)
         Parameter, value and prior standard deviation of each scalar nuisance.
     effects : ndarray, shape (rows, nuisances and draws)
@@ -235,8 +235,8 @@ def whiten(
     at = o.with_parameters(model.with_values(own))
     # The priors stay those about the model: only the effects are taken at the recording's own values.
     N, known = nuisances(at, repeatability), repeatability.applied(_scalar_nuisances(o))
-    friction = N[:, 0].reshape(o.sigma.shape) * o.sigma
-    floor = np.sqrt((o.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
+    between_runs = (N[:, : len(known)] ** 2).sum(axis=1).reshape(o.sigma.shape)
+    floor = np.sqrt((o.sigma**2 * (1.0 + between_runs)).mean(axis=1))
     by_channel = dict(zip(o.channels, floor.tolist(), strict=True))
     # In standard deviations, from what all recordings share.
     away = [(own.get(name, value) - value) / spread for name, value, spread in known]
