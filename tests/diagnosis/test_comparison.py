@@ -40,7 +40,8 @@ FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-s
 KINK, STRIBECK = ("kink", "conduit"), ("stribeck", "conduit")
 STARTS = [
     {"torque-scale/drive-sensor/gain": 0.05},
-    {f"pulley-friction/drive-pulley/{name}": 2e-3 for name in ("friction_torque", "presliding")},
+    {f"pulley-friction/drive-pulley/{name}": 2e-3 for name in ("friction_torque", "presliding")}
+    | {"pulley-friction/drive-pulley/share": 0.0},
 ]
 BASE_VALUES = {"friction_coefficient": 0.15}
 VALUES = {

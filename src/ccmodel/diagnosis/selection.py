@@ -205,7 +205,7 @@ class Selection:
         every = [(h, one) for h, s in starts for one in (other_start(s, self.known), s) if one is not None]
         pairs = [(base.hypothesis.and_also(further), start) for further, start in every]
         fitted = self._fitted(whitened, pairs, search, calibration)
-        least = min(c.mean_square for c in [base, *fitted] if c.is_plausible)
+        least = min((c.mean_square for c in [base, *fitted] if c.is_plausible), default=np.inf)
         implausible = [c for c in fitted if not c.is_plausible and c.mean_square < least]
         again = [(c.hypothesis, c.values) for c in implausible]
         return lowest(fitted + self._fitted(whitened, again, search, {}, within_range=True))
