@@ -10,7 +10,7 @@ import pytest
 from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import comparison as comparisons
 from ccmodel.diagnosis import selection as selections
-from ccmodel.diagnosis.candidate import LAST_SEARCH, VALUES_STAY, CandidateFit, fit
+from ccmodel.diagnosis.candidate import LAST_SEARCH, VALUES_STAY, CandidateFit
 from ccmodel.diagnosis.comparison import Comparison, imitation, log_priors, priors_of_further
 from ccmodel.diagnosis.discrepancy import Evidence
 from ccmodel.diagnosis.hypothesis import Hypothesis
@@ -941,42 +941,6 @@ def test_contenders_are_fitted_to_the_end_and_others_stay(monkeypatch):
     assert Selection({}, [], deadline=Deadline(0.0)).completed(found) is found, "some may not be fitted to the end"
     enough = compared(evidence(), (fitted(1.0, SCALE), evidence(NONE)))
     assert Selection({}, []).completed(enough) is enough
-
-
-def test_a_candidate_whose_best_strength_is_implausible_is_fitted_within_what_is_plausible(monkeypatch):
-    """The drive torque is 25 % too large; an error of its gain by 15 % is plausible."""
-    monkeypatch.undo()
-    recordings = batch(lambda simulated: {"tau_in_Nm": 0.25 * simulated["tau_in_Nm"]})
-    base = calibrated(recordings)
-    selection, gain = Selection(base.free, []), "torque-scale/drive-sensor/gain"
-    scores = [Score(Hypothesis((SCALE,)), 0.0, STARTS[0])]
-    best = fit(recordings, Hypothesis((SCALE,)), base.free, base.values | STARTS[0])
-    assert best.values[gain] == pytest.approx(0.25, abs=0.01)
-    assert not best.is_plausible
-    (found,) = selection.fit_all(recordings, base, scores)
-    assert found.is_plausible
-    assert found.values[gain] == pytest.approx(0.15, rel=1e-3)
-    assert best.mean_square < found.mean_square < base.mean_square / 2
-    # No candidate is repeated that leaves more than a plausible one.
-    wild, better, asked = fitted(2.0, SCALE, **{gain: 5.0}), fitted(1.5, FRICTION), []
-    monkeypatch.setattr(Selection, "_fitted", lambda self, *given, **also: asked.append(given[1]) or [wild, better])
-    selection.fit_all(WHITENED, fitted(6.0), scores)
-    assert [len(pairs) for pairs in asked] == [1, 0]
-
-
-def test_a_rival_is_not_lost_where_only_an_implausible_fit_is_found_again(monkeypatch):
-    monkeypatch.undo()
-    recordings = batch(lambda simulated: {"tau_in_Nm": 0.1 * simulated["tau_in_Nm"]})
-    base = calibrated(recordings)
-    scores = [Score(Hypothesis((a,)), 0.0, values) for a, values in zip((SCALE, FRICTION), STARTS, strict=True)]
-    best, rival = Selection(base.free, []).fit_all(recordings, base, scores)
-    wild = replace(rival, values=rival.values | {f"{FRICTION[0]}/{FRICTION[1]}/friction_torque": 9.0})
-    monkeypatch.setattr(selections, "contenders", lambda found: (found.by_evidence, []))
-    monkeypatch.setattr(Selection, "fit_all", lambda *given, calibration: [best, wild])
-    found = Selection(base.free, []).relinearise(Comparison.of(recordings, base, [best, rival], SCREENED))
-    again = next(c for c in found.candidates if c.hypothesis == rival.hypothesis)
-    assert again.is_plausible
-    assert again.values == pytest.approx(rival.values, rel=1e-6, abs=1e-6)
 
 
 def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):

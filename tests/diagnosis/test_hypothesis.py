@@ -121,27 +121,6 @@ def test_of_a_strength_with_a_state_what_is_left_is_judged():
     assert found == [False, False, True]
 
 
-def test_strengths_can_be_kept_within_what_is_plausible():
-    """A ratio has two limits; a strength that may be as small as zero, one. A fit may go three times as far."""
-    both = Hypothesis((("cable-asymmetry", "cable"), ("pulley-friction", "drive-pulley")))
-    far = {key: 1e3 for key in both.start}
-    limits = {key: free for key, free in both.free(far, within_range=True).items() if key in both.neutral}
-    assert {key.split("/")[-1]: (free.low, free.high) for key, free in limits.items()} == {
-        "ratio": pytest.approx((0.4, 2.1)),
-        "K_ratio": pytest.approx((0.4, 2.1)),
-        "friction_torque": pytest.approx((0.0, 0.075)),
-    }
-    start = {key: free.start for key, free in both.free(far, within_range=True).items()}
-    assert plausible(both, start) and not plausible(both, {key: f.start for key, f in both.free(far).items()})
-    assert both.at_limit(start) == dict.fromkeys(limits, True)
-    lowest = both.free(dict.fromkeys(far, 0.0), within_range=True)
-    at_limit = both.at_limit({key: free.start for key, free in lowest.items()})
-    assert at_limit == {"cable-asymmetry/cable/ratio": False, "cable-asymmetry/cable/K_ratio": False}
-    assert both.at_limit(both.start) == {}
-    shape = "pulley-friction/drive-pulley/presliding"
-    assert both.free(far, within_range=True)[shape].high == both.free(far)[shape].high
-
-
 def test_a_signed_strength_is_bounded_alike_on_both_sides():
     signed = Parameter("x", "1", 0.02, 0.2, 0.05, "a share", signed=True)
     low, high = _bounds(signed, is_strength=True)

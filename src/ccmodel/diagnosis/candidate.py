@@ -274,7 +274,6 @@ def fit(
     deadline: Deadline = UNLIMITED,
     search: Search = SEARCH,
     calibration: Mapping[str, float] | None = None,
-    within_range: bool = False,
 ) -> CandidateFit:
     """Fit a candidate model from given values and cross-validate it.
 
@@ -292,9 +291,6 @@ def fit(
     calibration : mapping of str to float, optional
         Values of `free` from which the search may start too, where the initial tension is not observed. The default is
         the start with a slack cable. A fit that goes on from an earlier one needs none of these.
-    within_range : bool
-        Whether the strengths of the mechanisms stay within what is plausible. A fit may leave it otherwise, so that
-        one can see that it would.
 
     Raises
     ------
@@ -303,7 +299,7 @@ def fit(
     ccmodel.deadline.OutOfTimeError
         If the deadline has passed.
     """
-    unknowns = _unknowns(whitened, hypothesis, free, start, within_range)
+    unknowns = _unknowns(whitened, hypothesis, free, start)
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
     # Runs of the paper's model are cheap, and its cost is rough where much is missing.
@@ -348,14 +344,10 @@ def _has_states(hypothesis: Hypothesis) -> bool:
 
 
 def _unknowns(
-    whitened: Sequence[Whitened],
-    hypothesis: Hypothesis,
-    free: Mapping[str, Free],
-    start: Mapping[str, float],
-    within_range: bool = False,
+    whitened: Sequence[Whitened], hypothesis: Hypothesis, free: Mapping[str, Free], start: Mapping[str, float]
 ) -> dict[str, Free]:
     """Unknowns of the calibration and of the mechanisms, with their priors and these starting values."""
-    unknowns = {n: replace(f, start=start[n]) for n, f in free.items()} | hypothesis.free(start, within_range)
+    unknowns = {n: replace(f, start=start[n]) for n, f in free.items()} | hypothesis.free(start)
     return unknowns | _with_priors(whitened, hypothesis, unknowns)
 
 

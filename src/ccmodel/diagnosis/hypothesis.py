@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
-from math import isclose, prod
+from math import prod
 
 from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
@@ -89,27 +89,10 @@ class Hypothesis:
         """Values of the mechanisms' strengths at which they have no effect."""
         return {key: parameter.neutral for key, parameter, is_strength in self._unknowns() if is_strength}
 
-    def free(self, start: Mapping[str, float], within_range: bool = False) -> dict[str, Free]:
-        """The mechanisms' parameters as unknowns, from `start`; `within_range`: with strengths that are plausible."""
-
-        def bounds(parameter: Parameter, is_strength: bool) -> tuple[float, float]:
-            low, high = _bounds(parameter, is_strength)
-            if not (is_strength and within_range):
-                return low, high
-            least, most = _plausible_range(parameter)
-            return max(low, least), min(high, most)
-
-        return {key: Free.within(start[key], *bounds(p, is_strength)) for key, p, is_strength in self._unknowns()}
-
-    def at_limit(self, values: Mapping[str, float]) -> dict[str, bool]:
-        """Strengths that stand at a limit of what is plausible other than zero effect; True: at the upper one."""
-        found = {}
-        strengths = ((key, p) for key, p, is_strength in self._unknowns() if is_strength and key in values)
-        for key, strength in strengths:
-            for limit, is_upper in zip(_plausible_range(strength), (False, True), strict=True):
-                if limit != strength.neutral and isclose(values[key], limit, rel_tol=settings.AT_BOUND):
-                    found[key] = is_upper
-        return found
+    def free(self, start: Mapping[str, float]) -> dict[str, Free]:
+        """The mechanisms' parameters as unknowns, from `start`."""
+        unknowns = self._unknowns()
+        return {key: Free.within(start[key], *_bounds(parameter, strength)) for key, parameter, strength in unknowns}
 
     @property
     def continuation(self) -> list[str]:
@@ -199,16 +182,14 @@ def _left(name: str, place: str, values: Mapping[str, float]) -> float:
 
 
 def _is_plausible(strength: Parameter, value: float) -> bool:
-    low, high = _plausible_range(strength)
-    return low <= value <= high
-
-
-def _plausible_range(strength: Parameter) -> tuple[float, float]:
-    """Lowest and highest value of a strength in an accepted model."""
     low, high = sorted((settings.RANGE_SLACK * strength.low, settings.RANGE_SLACK * strength.high))
     if strength.ratio:
-        return strength.low / settings.RANGE_SLACK, high
-    return (-high, high) if strength.signed else (min(low, 0.0), max(high, 0.0))
+        low = strength.low / settings.RANGE_SLACK
+    elif strength.signed:
+        low = -high
+    else:
+        low, high = min(low, 0.0), max(high, 0.0)
+    return low <= value <= high
 
 
 def _bounds(parameter: Parameter, is_strength: bool) -> tuple[float, float]:

@@ -71,12 +71,7 @@ class NormalEquations:
             (value - means[name]) / sd if name in means else 0.0
             for (name, value), sd in zip(candidate.values.items(), prior_sd, strict=True)
         ]
-        return cls(information, score, square, prior_sd, np.array(from_mean)).held(_is_held(candidate, score))
-
-    def held(self, is_held: NDArray) -> Self:
-        """The same where some unknowns keep their values; their part of the determinant stays; shape (unknowns,)."""
-        known = replace(self, prior_sd=np.where(is_held, 0.0, self.prior_sd))
-        return replace(known, square=self.square + self._log_determinant - known._log_determinant)
+        return cls(information, score, square, prior_sd, np.array(from_mean))
 
     def scaled(self, factors: NDArray) -> Self:
         """The same with unknowns in units that are larger by factors, shape (unknowns,)."""
@@ -92,18 +87,14 @@ class NormalEquations:
         """Logarithm of the evidence, up to a constant that all candidates share."""
         root = np.linalg.cholesky(self._information_over_prior)
         along = np.linalg.solve(root, self.prior_sd * self.score + self.from_mean)
-        squares = self.square + self.from_mean @ self.from_mean - along @ along
-        return float(-(squares + self._log_determinant) / 2)
+        determinant = 2 * np.log(np.diag(root)).sum()
+        return float(-(self.square + self.from_mean @ self.from_mean - along @ along + determinant) / 2)
 
     @property
     def most_probable(self) -> NDArray:
         """Change of each unknown to its most probable value, shape (unknowns,)."""
         along = self.prior_sd * self.score + self.from_mean
         return -self.prior_sd * np.linalg.solve(self._information_over_prior, along)
-
-    @property
-    def _log_determinant(self) -> float:
-        return 2 * float(np.log(np.diag(np.linalg.cholesky(self._information_over_prior))).sum())
 
     @property
     def _information_over_prior(self) -> NDArray:
@@ -114,16 +105,6 @@ def sample_weight(w: Whitened, recordings: int) -> float:
     """Weight of each squared residual of a recording, so that a channel counts as `IN_EVIDENCE` samples at most."""
     samples = w.measured.shape[1]
     return min(IN_EVIDENCE, samples) / samples * _share_of_one(w, recordings)
-
-
-def _is_held(candidate: CandidateFit, score: NDArray) -> NDArray:
-    """Whether each unknown is a strength at the limit of what is plausible, and the cost falls beyond; (unknowns,).
-
-    The linear model would otherwise credit the candidate with what only an implausible strength explains.
-    """
-    at_limit = candidate.hypothesis.at_limit(candidate.values)
-    falls_upwards = dict(zip(candidate.values, (score < 0).tolist(), strict=True))
-    return np.array([at_limit.get(name) == falls for name, falls in falls_upwards.items()])
 
 
 def _nuisance_weight(w: Whitened, recordings: int) -> float:

@@ -196,36 +196,17 @@ class Selection:
     ) -> list[CandidateFit]:
         """Fit extensions of a fitted model, from the values of their scores and from known ones, until the deadline.
 
-        Of several fits of a hypothesis, the one with the lowest mean square is returned, a plausible one if there is
-        one. Where a fit with an implausible strength leaves less than all others, it is repeated within what is
-        plausible: a strength that recordings hardly determine may leave its range for a small gain. `calibration` as
-        of `ccmodel.diagnosis.candidate.fit`.
+        Of several fits of a hypothesis, the one with the lowest mean square is returned. `calibration` as of
+        `ccmodel.diagnosis.candidate.fit`.
         """
         starts = [(score.hypothesis, base.values | score.values) for score in chosen]
         every = [(h, one) for h, s in starts for one in (other_start(s, self.known), s) if one is not None]
-        pairs = [(base.hypothesis.and_also(further), start) for further, start in every]
-        fitted = self._fitted(whitened, pairs, search, calibration)
-        least = min((c.mean_square for c in [base, *fitted] if c.is_plausible), default=np.inf)
-        implausible = [c for c in fitted if not c.is_plausible and c.mean_square < least]
-        again = [(c.hypothesis, c.values) for c in implausible]
-        return lowest(fitted + self._fitted(whitened, again, search, {}, within_range=True))
-
-    def _fitted(
-        self,
-        whitened: Sequence[Whitened],
-        pairs: Sequence[tuple[Hypothesis, Mapping[str, float]]],
-        search: Search,
-        calibration: Mapping[str, float] | None,
-        within_range: bool = False,
-    ) -> list[CandidateFit]:
-        """Hypotheses fitted from their starts, as far as they can be run, until the deadline."""
         fitted = []
-        for k, (hypothesis, start) in enumerate(pairs):
-            self.progress(f"fitting {hypothesis}" + " within what is plausible" * within_range, k / len(pairs))
+        for k, (further, start) in enumerate(every):
+            hypothesis = base.hypothesis.and_also(further)
+            self.progress(f"fitting {hypothesis}", k / len(every))
             try:
-                candidate = fit(
-                    whitened, hypothesis, self.free, start, self.deadline, search, calibration, within_range
-                )
+                candidate = fit(whitened, hypothesis, self.free, start, self.deadline, search, calibration)
             except OutOfTimeError:
                 self.progress(f"{hypothesis}: not fitted, the time is over")
                 break
@@ -234,7 +215,7 @@ class Selection:
                 continue
             self.progress(f"{hypothesis}: leave-one-out mean square {candidate.mean_square:.2f}")
             fitted.append(candidate)
-        return fitted
+        return lowest(fitted)
 
     def extended(self, found: Comparison, screening: Screening, size: int) -> Comparison:
         """The same with sets of `size` mechanisms, and with the parts of the best of them that lack a member.
@@ -320,10 +301,8 @@ class Selection:
         # Until the selection ends, all are fitted again.
         if self.deadline.has_passed and self.goes_on:
             return found
-        # No rival must be lost, as one that could not be fitted again, or not within what is plausible: without it, the
-        # others would be more probable.
-        possible = {c.hypothesis for c in near if c.is_plausible}
-        fitted = {c.hypothesis for c in again if c.is_plausible or c.hypothesis not in possible}
+        # No rival must be lost, as one that could not be fitted again: without it, the others would be more probable.
+        fitted = {c.hypothesis for c in again}
         again += self._evaluated([*far, *(c for c in near if c.hypothesis not in fitted)], whitened)
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
