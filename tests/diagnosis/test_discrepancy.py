@@ -79,6 +79,30 @@ def test_scaled_equations_are_those_of_unknowns_in_another_unit():
     np.testing.assert_allclose(scaled.most_probable, change, rtol=1e-9)
 
 
+def test_an_unknown_that_may_be_neutral_has_the_mean_evidence_of_a_model_with_it_and_one_without():
+    random = np.random.default_rng(6)
+    J, e, away = random.standard_normal((12, 3)), random.standard_normal(12), 0.4
+    prior_sd, from_mean = np.array([0.5, 2.0, 1.0]), np.array([0.7, 0.0, 0.0])
+    free = NormalEquations(J.T @ J, J.T @ e, float(e @ e), prior_sd, from_mean)
+    at_neutral, rest = e - away * J[:, 1], J[:, [0, 2]]
+    without = NormalEquations(
+        rest.T @ rest, rest.T @ at_neutral, float(at_neutral @ at_neutral), prior_sd[[0, 2]], from_mean[[0, 2]]
+    )
+    mean = np.logaddexp(free.log_evidence, without.log_evidence) - np.log(2)
+    optional = replace(free, from_neutral={1: away})
+    assert optional.log_evidence == pytest.approx(mean, rel=1e-12)
+    factors = np.array([3.0, 0.1, 2.0])
+    scaled = NormalEquations(
+        np.outer(factors, factors) * free.information, factors * free.score, free.square, prior_sd, from_mean / factors,
+        {1: away / factors[1]},
+    )  # fmt: skip
+    assert optional.scaled(factors).log_evidence == pytest.approx(scaled.log_evidence, rel=1e-12)
+
+
+def test_a_share_of_a_bearings_friction_may_be_zero():
+    assert [p.name for p in registry.get("pulley-friction").parameters if p.optional] == ["share"]
+
+
 def test_noise_has_no_discrepancy(recordings, discrepancy):
     found = evidence_of(discrepancy, fitted(recordings, lambda k, o: 0.0), 0.0, EXCESS)
     assert found.exact > found.incomplete + 2

@@ -4,7 +4,8 @@ A candidate leaves whitened residuals e = J dtheta + noise. J are its derivative
 prior. What the evidence and the most probable change of the unknowns depend on is the weighted sums J'J, J'e and e'e.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -37,6 +38,9 @@ class NormalEquations:
         Distance of the unknowns from their prior's mean over its standard deviation, where the prior has a mean of its
         own: that of a law's coefficients, of what differs between batches, and of the states of mechanisms when a
         recording starts; 0 elsewhere.
+    from_neutral : mapping of int to float
+        Distance from the neutral value of each unknown that may as well be neutral (`Parameter.optional`), by its
+        number.
     """
 
     information: NDArray
@@ -44,6 +48,7 @@ class NormalEquations:
     square: float
     prior_sd: NDArray
     from_mean: NDArray
+    from_neutral: Mapping[int, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, candidate: CandidateFit) -> "NormalEquations":
@@ -71,7 +76,8 @@ class NormalEquations:
             (value - means[name]) / sd if name in means else 0.0
             for (name, value), sd in zip(candidate.values.items(), prior_sd, strict=True)
         ]
-        return cls(information, score, square, prior_sd, np.array(from_mean))
+        from_neutral = _from_neutral(candidate)
+        return cls(information, score, square, prior_sd, np.array(from_mean), from_neutral)
 
     def scaled(self, factors: NDArray) -> Self:
         """The same with unknowns in units that are larger by factors, shape (unknowns,)."""
@@ -80,11 +86,30 @@ class NormalEquations:
             information=factors[:, None] * self.information * factors,
             score=factors * self.score,
             from_mean=self.from_mean / factors,
+            from_neutral={k: away / factors[k] for k, away in self.from_neutral.items()},
+        )
+
+    def held(self, k: int, change: float) -> Self:
+        """The same where one unknown changes by so much and is known."""
+        prior_sd = self.prior_sd.copy()
+        prior_sd[k] = 0.0
+        return replace(
+            self,
+            score=self.score + self.information[:, k] * change,
+            square=self.square + (2 * self.score[k] + self.information[k, k] * change) * change,
+            prior_sd=prior_sd,
         )
 
     @property
     def log_evidence(self) -> float:
-        """Logarithm of the evidence, up to a constant that all candidates share."""
+        """Logarithm of the evidence, up to a constant that all candidates share.
+
+        Unknowns that may be neutral are so with a probability of one half.
+        """
+        if self.from_neutral:
+            (k, away), *others = self.from_neutral.items()
+            free = replace(self, from_neutral=dict(others))
+            return float(np.logaddexp(free.log_evidence, free.held(k, -away).log_evidence) - np.log(2.0))
         root = np.linalg.cholesky(self._information_over_prior)
         along = np.linalg.solve(root, self.prior_sd * self.score + self.from_mean)
         determinant = 2 * np.log(np.diag(root)).sum()
@@ -130,6 +155,17 @@ def _prior_sd(candidate: CandidateFit, unknown: str) -> float:
         return free.spread / prior_spread(1.0, [w.observations for w in candidate.whitened])
     # A baseline's mechanisms are in every candidate, and so are their priors.
     return (free.high - free.low) / np.sqrt(12) if free else 1.0
+
+
+def _from_neutral(candidate: CandidateFit) -> dict[int, float]:
+    numbers = {name: k for k, name in enumerate(candidate.values)}
+    optional = {
+        mechanism_key(name, place, p.name): p.neutral
+        for name, place in candidate.hypothesis.acting
+        for p in registry.get(name).parameters
+        if p.optional
+    }
+    return {numbers[name]: candidate.values[name] - at for name, at in optional.items() if name in numbers}
 
 
 def _sd_within_range(p: Parameter, value: float) -> float:

@@ -87,6 +87,9 @@ class Parameter:
         model. The range is then that of the state, both ends included. 0: the same in all recordings.
     fixed : bool
         Whether the conditions of the recordings set it, and no fit changes it.
+    optional : bool
+        Whether a rig with the mechanism may as well have it at its neutral value, which has half of the prior
+        probability then.
     prior_sd : float
         Of a coefficient of an unknown law: standard deviation of its normal prior about the neutral value. 0: any value
         in the range is as probable.
@@ -109,6 +112,7 @@ class Parameter:
     below: float = inf
     spread: float = 0.0
     fixed: bool = False
+    optional: bool = False
     prior_sd: float = 0.0
 
     def at(self, share: float) -> float:

@@ -104,6 +104,7 @@ MECHANISM = Mechanism(
             scale="linear",
             screening_grid=(0.0, 1.0),
             default=0.0,
+            optional=True,
         ),
     ),
     mistaken_for=("torque-scale", "constant-drag"),
