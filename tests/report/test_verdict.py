@@ -34,12 +34,27 @@ def test_an_interval_across_zero_keeps_its_signs():
     assert claim(gain(-0.01, -0.04, 0.02)).endswith("reads 1 % low (-2 to 4 %)")
 
 
+def test_a_parameter_that_may_be_neutral_is_said_where_it_is_not():
+    def bearing(share, low, high):
+        torque = {"name": "friction_torque", "value": 4e-3, "low": 3.9e-3, "high": 4.1e-3, "unit": "N*m"}
+        of_pull = {"name": "share", "value": share, "low": low, "high": high, "unit": "1"}
+        return claim({"name": "pulley-friction", "place": "load-pulley", "parameters": [torque, of_pull]})
+
+    constant = "the load pulley's bearing has a friction torque of 4.0 mN m (3.9 to 4.1 mN m)"
+    assert bearing(0.01, 0.0, 0.03) == constant
+    assert bearing(0.8, 0.7, 0.9) == (
+        "the load pulley's bearing has a friction torque of 4.0 mN m at a pull of 10 N, 80 % of it in proportion to the"
+        " pull (3.9 to 4.1 mN m; 70 to 90 %)"
+    )
+
+
 @pytest.mark.parametrize("name", mechanisms.names())
 def test_every_mechanism_has_a_sentence_on_its_own_strengths(name):
     mechanism = mechanisms.get(name)
     fields = set(re.findall(r"\{(\w+)(?::%)?\}", mechanism.sentence)) - {"side"}
     assert {p.name for p in mechanism.strengths} <= fields <= {p.name for p in mechanism.parameters}
-    assert ("[" in mechanism.sentence) <= mechanism.strengths[0].signed
+    assert ("|" in mechanism.sentence) <= mechanism.strengths[0].signed
+    assert set(re.findall(r"\[(\w+): ", mechanism.sentence)) <= {p.name for p in mechanism.shapes}
     for place in mechanism.places:
         parameters = [
             {

@@ -76,8 +76,8 @@ MECHANISM = Mechanism(
         r"\xi\,\operatorname{sgn}(\omega)}{\mathrm{presliding}}"
     ),
     sentence=(
-        "the {side} pulley's bearing has a friction torque of {friction_torque} at a pull of 10 N, {share:%} of it in "
-        "proportion to the pull"
+        "the {side} pulley's bearing has a friction torque of {friction_torque}[share: at a pull of 10 N, {share:%} of "
+        "it in proportion to the pull]"
     ),
     places=("drive-pulley", "load-pulley"),
     parameters=(
