@@ -64,7 +64,8 @@ def test_no_motion_is_faster_than_the_rig(fastest):
 def test_slow_and_fast_friction_are_told_apart_by_speed():
     """Viscous friction that looks like a bearing at the one speed recorded: at another speed they part."""
     recordings = batch()
-    bearing = {f"pulley-friction/drive-pulley/{name}": 2e-3 for name in ("friction_torque", "presliding")}
+    numbers = {"friction_torque": 2e-3, "presliding": 2e-3, "share": 0.0}
+    bearing = {f"pulley-friction/drive-pulley/{name}": value for name, value in numbers.items()}
     rivals = [
         fitted(recordings, ("viscous-friction", "conduit"), **{"viscous-friction/conduit/c": 30.0}),
         fitted(recordings, ("pulley-friction", "drive-pulley"), **bearing),

@@ -85,3 +85,11 @@ def test_full_slip_answers_to_friction_as_the_capstan_does():
 def test_a_number_of_a_mechanism_that_does_not_act_is_refused(given):
     with pytest.raises(ValueError, match="no z0 of presliding"):
         PULLED.with_values({"presliding/conduit/z0": 1e-5})
+
+
+def test_a_value_that_is_all_but_zero_has_the_size_of_its_range():
+    """A share of 1e-12 may as well be zero, where a step of 1e-17 would be lost in rounding."""
+    share = "pulley-friction/load-pulley/share"
+    assert size_of(share, 1e-12) == size_of(share, 0.0) == pytest.approx(0.1)
+    assert size_of(share, 0.7) == 0.7
+    assert size_of("pulley-friction/load-pulley/friction_torque", 1e-4) == 1e-4

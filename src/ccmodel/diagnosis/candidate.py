@@ -245,11 +245,7 @@ class CandidateFit:
 
     def at_bounds(self) -> list[str]:
         """Unknowns of the calibration that stand at one of their bounds."""
-        return [name for name, free in self.free.items() if self._is_at_bound(self.values[name], free)]
-
-    @staticmethod
-    def _is_at_bound(value: float, free: Free) -> bool:
-        return any(np.isclose(value, bound, rtol=settings.AT_BOUND, atol=0.0) for bound in (free.low, free.high))
+        return [name for name, free in self.free.items() if is_at_bound(self.values[name], free)]
 
     def model(self, estimates: Parameters, batch: str = "") -> Parameters:
         """The fitted model, with estimates of everything that is not fitted; of one batch, with its own values.
@@ -336,6 +332,12 @@ def evaluated(candidate: CandidateFit, whitened: Sequence[Whitened]) -> Candidat
     solution = minimise(problem, inside_bounds(problem, problem.start), replace(SEARCH, most_evaluations=1))
     again = _cross_validated(hypothesis, candidate.free, problem, solution)
     return replace(again, message=VALUES_STAY, converged=candidate.converged)
+
+
+def is_at_bound(value: float, free: Free) -> bool:
+    """Whether a value is that of one of its bounds, all but for a small share of the bound, or of the range."""
+    ends, width = (free.low, free.high), free.high - free.low
+    return any(abs(value - bound) <= settings.AT_BOUND * (abs(bound) or width) for bound in ends)
 
 
 def _has_states(hypothesis: Hypothesis) -> bool:

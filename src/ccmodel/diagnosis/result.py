@@ -9,15 +9,17 @@ from ccmodel import mechanisms as registry
 from ccmodel.channels import short_name, unit_of
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import experiment, location, repeatability, settings
-from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift, fit
+from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift, fit, is_at_bound
 from ccmodel.diagnosis.comparison import friction_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.law_report import laws_of
+from ccmodel.diagnosis.linear_functions import covariance_by_information
 from ccmodel.diagnosis.observations import NotJudged
 from ccmodel.diagnosis.verdict import Judgement, nested_choice
 from ccmodel.distributions import normal_quantile
 from ccmodel.failure import ModelError
 from ccmodel.inference.intervals import COVERAGE
+from ccmodel.inference.problem import Free
 from ccmodel.model.parameters import Parameters, mechanism_key
 
 FORMAT = 1
@@ -153,8 +155,8 @@ def mechanism_of(candidate: CandidateFit, k: int, confidence: float, shift: NDAr
     name, place = candidate.hypothesis.acting[k]
     names = list(candidate.values)
     shift = np.zeros(len(names)) if shift is None else shift
-    reach = candidate.half_widths(shift)
     free = candidate.hypothesis.free(candidate.values)
+    reach = _half_widths(candidate, free, shift)
     parameters = []
     mechanism = registry.get(name)
     for p in mechanism.parameters:
@@ -171,6 +173,19 @@ def mechanism_of(candidate: CandidateFit, k: int, confidence: float, shift: NDAr
         unit = p.unit.replace(" ", "*")
         parameters.append({"name": p.name, "value": value, "low": ends[0], "high": ends[1], "unit": unit})
     return {"name": name, "place": place, "confidence": round(confidence, 4), "parameters": parameters}
+
+
+def _half_widths(candidate: CandidateFit, free: Mapping[str, Free], shift: NDArray) -> NDArray:
+    """Half-widths of the unknowns' intervals; of one at its bound, at least that of the information.
+
+    There it does not scatter between recordings, however little they show of it.
+    """
+    reach = candidate.half_widths(shift)
+    at_bound = [name in free and is_at_bound(value, free[name]) for name, value in candidate.values.items()]
+    if not any(at_bound):
+        return reach
+    by_information = np.sqrt(np.diag(covariance_by_information(candidate)).clip(0.0))
+    return np.where(at_bound, np.maximum(reach, normal_quantile(0.5 + COVERAGE / 2) * by_information), reach)
 
 
 def interval(value: float, reach: float, is_relative: bool) -> NDArray:

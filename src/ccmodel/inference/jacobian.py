@@ -18,15 +18,26 @@ from ccmodel.model.parameters import mechanism_parameter, parameter_of
 STEP = 1e-5
 # What stands for the size of a parameter that is zero, by the end of its name.
 SIZE_AT_ZERO = {"_Nm": 1e-3, "_N": 1.0, "_rad": 1e-2}
+# Least size of a parameter whose range is linear, as a share of the range: zero is a value like any other there.
+LEAST_SIZE = 0.1
 
 
 def size_of(name: str, value: float) -> float:
-    """The size by which a parameter's steps are measured: its own, or, at zero, a plausible one."""
-    if value != 0:
-        return abs(value)
+    """The size by which a parameter's steps are measured: its own, or, at zero, a plausible one.
+
+    Of a mechanism's parameter with a linear range it is at least a share of the range: the step of a value that is all
+    but zero would be lost in rounding.
+    """
+    p = None
     if (parts := mechanism_parameter(name)) is not None:
         mechanism, _, parameter = parts
-        return next(p.start for p in registry.get(mechanism).parameters if p.name == parameter) or 1.0
+        p = registry.get(mechanism).parameter(parameter)
+        if p.scale == "linear" and np.isfinite(p.high - p.low):
+            return max(abs(value), LEAST_SIZE * (p.high - p.low))
+    if value != 0:
+        return abs(value)
+    if p is not None:
+        return p.start or 1.0
     return next((size for end, size in SIZE_AT_ZERO.items() if parameter_of(name).endswith(end)), 1.0)
 
 
