@@ -57,8 +57,8 @@ def _arrays(table: Table | None) -> tuple[NDArray, NDArray]:
 
 @kernel
 def _error(theta: float, pulley: Pulley) -> float:
-    """The error g of the encoder where it reads theta."""
-    return np.interp(theta, pulley.read_rad, pulley.error_rad) if pulley.read_rad.size else 0.0
+    """The error g of an encoder that has one, where it reads theta."""
+    return np.interp(theta, pulley.read_rad, pulley.error_rad)
 
 
 @kernel
@@ -80,7 +80,8 @@ def winding(theta: float, pulley: Pulley) -> tuple[float, float, float]:
     """Cable travel over R (rad), from any zero; the radius over R, and the derivative of the latter by the angle."""
     e, psi = pulley.eccentricity, pulley.phase_rad
     travel, factor, slope = theta - e * np.cos(theta + psi), 1.0 + e * np.sin(theta + psi), e * np.cos(theta + psi)
-    travel -= _error(theta, pulley)
+    if pulley.read_rad.size:
+        travel -= _error(theta, pulley)
     if pulley.knots_rad.size:
         added_rad, added, by_angle = _added(theta, pulley)
         return travel + added_rad, factor + added, slope + by_angle

@@ -65,8 +65,7 @@ def _few(distance: NDArray, least: float, is_judged: NDArray) -> NDArray:
     They are farther from the median of their neighbours than all others are, by a factor. Whatever a rig does, from
     noise to a load that snaps, it does more than once in a recording or within several samples.
     """
-    found = _standing_out(distance, max(int(limits.BAD_CELLS_FRACTION * distance.size), 1), least)
-    return found[is_judged[found]]
+    return _standing_out(distance, max(int(limits.BAD_CELLS_FRACTION * distance.size), 1), least, is_judged)
 
 
 def _many(values: NDArray, distance: NDArray, least: float, is_judged: NDArray) -> NDArray:
@@ -79,8 +78,7 @@ def _many(values: NDArray, distance: NDArray, least: float, is_judged: NDArray) 
     steps = np.abs(np.diff(values))
     # The first and the last reading have one neighbour, and may be part of another motion.
     single = np.minimum(np.append(steps, 0.0), np.insert(steps, 0, 0.0))
-    found = _standing_out(np.minimum(distance, single), int(limits.MOST_OUTLIERS * values.size), least)
-    return found[is_judged[found]]
+    return _standing_out(np.minimum(distance, single), int(limits.MOST_OUTLIERS * values.size), least, is_judged)
 
 
 def _distances(values: NDArray) -> tuple[NDArray, float, NDArray]:
@@ -111,9 +109,13 @@ def _beyond_adjacent(values: NDArray) -> NDArray:
     return np.pad(np.maximum(beyond, 0.0), 1)
 
 
-def _standing_out(distance: NDArray, most: int, least: float) -> NDArray:
-    """Positions of the largest distances, at most so many, of which the last is larger than the next by a factor."""
+def _standing_out(distance: NDArray, most: int, least: float, is_judged: NDArray) -> NDArray:
+    """Positions of the largest distances, at most so many, of which the last is larger than the next by a factor.
+
+    Those that cannot be judged are left out afterwards.
+    """
     order = np.argsort(-distance, kind="stable")
     leading = distance[order[: most + 1]]
     stands_out = (leading[:-1] > limits.OUTLIER_FACTOR * leading[1:]) & (leading[:-1] > least)
-    return np.sort(order[: np.flatnonzero(stands_out)[-1] + 1]) if stands_out.any() else np.array([], int)
+    found = np.sort(order[: np.flatnonzero(stands_out)[-1] + 1]) if stands_out.any() else np.array([], int)
+    return found[is_judged[found]]
