@@ -65,14 +65,28 @@ NOW, STEP, SAVED, LAST, BEFORE = range(5)
     END_BY_END,
 ) = range(11)
 # load, shape (rows,): angle (rad), rotation (rad) and duration (s) of the last step, speed (rad/s), speed before that,
-# bristle of the bearing; then speed, bristle, torque (N m) and torque in the bearing (N m) of this step.
-ANGLE, ROTATION, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE, IN_BEARING = range(10)
+# acceleration (rad/s^2), bristle of the bearing; then speed, acceleration, bristle, torque (N m) and torque in the
+# bearing (N m) of this step.
+(
+    ANGLE,
+    ROTATION,
+    DT,
+    OMEGA,
+    OMEGA_BEFORE,
+    ACCELERATION,
+    BEARING,
+    OMEGA_NEXT,
+    ACCELERATION_NEXT,
+    BEARING_NEXT,
+    TORQUE,
+    IN_BEARING,
+) = range(12)
 # past, shape (rows,): rotations of the load (rad) and pulls (m) of the last two steps; duration of the last (s).
 LAST_ROTATION, ROTATION_BEFORE, LAST_PULL, PULL_BEFORE, LAST_DT = range(5)
 PAST_ROWS = 5
 # drive pulley, shape (3,): angle, middle of the range that its encoder leaves open (rad); bristle of its bearing.
 DRIVE_ANGLE, DRIVE_MIDDLE, DRIVE_BEARING = range(3)
-PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 22 + 2 * MOST_ELEMENTS, 5, 11, 10
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 22 + 2 * MOST_ELEMENTS, 5, 11, 12
 # Then, in a run that has them, tables (`ccmodel.mechanisms.tables`) of compliance and of friction, each by tension; and
 # one of drag by speed, from the row `drag_table` of the run's constants. The load may have the tables of `LOAD_LAWS`,
 # each from the row of its name in the run's constants.
@@ -98,6 +112,7 @@ if TYPE_CHECKING:
         load_pulley: Pulley
         stiffness_load: float
         load_damping: float
+        rings: bool
         kind: int
         general_friction: bool
         has_spring_table: bool
@@ -116,8 +131,8 @@ else:
     Physics = namedtuple(
         "Physics",
         "has_settling has_relaxation relaxing_times_s bristle presliding creep element_m element_share elements "
-        "load_pulley stiffness_load load_damping kind general_friction has_spring_table has_friction_table drag_table "
-        + " ".join(("has_load_laws", *LOAD_LAWS, *registry.march_settings())),
+        "load_pulley stiffness_load load_damping rings kind general_friction has_spring_table has_friction_table "
+        "drag_table " + " ".join(("has_load_laws", *LOAD_LAWS, *registry.march_settings())),
     )
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen

@@ -138,6 +138,7 @@ def accept(
     if dt > 0.0:
         load[rows.ROTATION], load[rows.DT] = rotation, dt
         load[rows.OMEGA_BEFORE], load[rows.OMEGA] = load[rows.OMEGA], load[rows.OMEGA_NEXT]
+        load[rows.ACCELERATION] = load[rows.ACCELERATION_NEXT]
     load[rows.ANGLE] += rotation
     load[rows.BEARING] = load[rows.BEARING_NEXT]
     if ph.load_elements > 0:

@@ -44,6 +44,10 @@ OUTPUTS = (*TENSIONS, THETA_OUT, TAU_OUT, TAU_IN, THETA_IN)
 # A step covers no more than this phase of a load that rings, up to so many steps a sample. A load that rings faster,
 # near half the sampling rate and above, shows its inertia in the samples but not its ringing, and needs only a few.
 RINGING_STEP_RAD, MOST_STEPS, UNRESOLVED_STEPS = 0.15, 16, 2
+# A ring is followed without added damping (`speed_and_acceleration` in ccmodel.model.general.equations) where friction
+# builds up over more than this length, and a step covers no more than this phase of the faster ring on a bearing that
+# sticks. On contacts that stick at once, a mass would jump to and fro.
+SMOOTH_BRISTLE_M, STUCK_STEP_RAD = 2e-6, 0.8
 
 
 class Motor(NamedTuple):
@@ -182,10 +186,12 @@ def prepared(
     elements: int,
     steps: int,
     series: NDArray,
+    rings: bool = False,
 ) -> Prepared:
     """The pair before the first sample.
 
-    `series` is the load's prescribed torque or angle, shape (n,) or (1,).
+    `series` is the load's prescribed torque or angle, shape (n,) or (1,). A load with mass may ring if `rings`: its
+    motion then has to follow from the drive's, and not the other way round.
     """
     grid = make_grid(transmission.path, elements, settings.kinks)
     load_laws = _load_laws(settings, load)
@@ -206,7 +212,8 @@ def prepared(
     state[rows.ANGLE] = load_angle(physics, T, load, series, settings.load_by_angle)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
     drive = pulley_at(settings, "drive", transmission.drive_radius_m)
-    steps *= _steps(physics, transmission, time_s)
+    of_ring, is_followed = _steps(physics, transmission, time_s)
+    physics, steps = physics._replace(rings=rings and is_followed), steps * of_ring
     return Prepared(physics, piece, node, slide, mean, state, drive, friction_factor, steps)
 
 
@@ -226,7 +233,7 @@ def _marched(
 
     Parameters as of `prepared`.
     """
-    at = prepared(transmission, load, settings, time_s, theta_in, initial, elements, steps, series)
+    at = prepared(transmission, load, settings, time_s, theta_in, initial, elements, steps, series, rings=True)
     state = at.physics, at.piece, at.node, at.slide, at.mean, at.load
     out = np.empty((len(OUTPUTS), time_s.size))
     drive = motor.angle_rad, motor.within_rad, at.drive
@@ -408,6 +415,7 @@ def _physics(
         load_pulley=pulley_at(settings, "load", transmission.load_radius_m),
         stiffness_load=float(K_e),
         load_damping=float(load_damping(settings, K_e)),
+        rings=False,
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad | FixedLoad) else rows.IMPEDANCE,
         general_friction=has_friction_by_tension(settings) or has_drag(settings) or settings.viscous != 0,
         has_spring_table=any(law is not None for law in springs),
@@ -437,18 +445,24 @@ def _contacts(settings: Settings) -> tuple[Contacts, bool]:
     return Contacts.of_law(law.knots, law.values), True
 
 
-def _steps(physics: rows.Physics, transmission: Transmission, time_s: NDArray) -> int:
-    """Steps from one sample to the next that resolve a load with mass as it rings on the cables; a power of two.
+def _steps(physics: rows.Physics, transmission: Transmission, time_s: NDArray) -> tuple[int, bool]:
+    """Steps from one sample to the next, a power of two, and whether a load that rings can be followed undamped.
 
     The number must not change where a fit takes a difference over the mass, and powers of two are far apart.
     """
     if physics.inertia == 0 or physics.kind == rows.PRESCRIBED_ANGLE or time_s.size < 2:
-        return 1
+        return 1, False
     cables = 2 * transmission.axial_rigidity_N / transmission.path.length_m * physics.load_pulley.radius_m**2
-    rings_rad_per_s = np.sqrt((cables + physics.stiffness_load) / physics.inertia)
-    wanted = rings_rad_per_s * float(np.median(np.diff(time_s))) / RINGING_STEP_RAD
-    steps = int(max(2 ** np.ceil(np.log2(wanted)), 1))
-    return steps if steps <= MOST_STEPS else UNRESOLVED_STEPS
+    stiffness = cables + physics.stiffness_load
+    bearing = physics.load_friction_Nm / physics.load_presliding_rad if physics.load_friction_Nm else 0.0
+    sample_s = float(np.median(np.diff(time_s)))
+    # Phases from one sample to the next, of the ring on the cables, and on a bearing that sticks too.
+    rings, sticks = (sample_s * np.sqrt(K / physics.inertia) for K in (stiffness, stiffness + bearing))
+    steps = int(max(2 ** np.ceil(np.log2(rings / RINGING_STEP_RAD)), 1))
+    if steps > MOST_STEPS:
+        return UNRESOLVED_STEPS, False
+    is_smooth = physics.presliding and physics.bristle > SMOOTH_BRISTLE_M
+    return steps, bool(is_smooth and sticks / steps < STUCK_STEP_RAD)
 
 
 def _coulomb_bristle(transmission: Transmission, settings: Settings) -> float:
