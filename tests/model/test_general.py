@@ -283,8 +283,8 @@ def test_the_phase_error_of_a_ring_falls_with_the_fourth_power_of_the_step(monke
     assert errors[0] > 12 * errors[1] > 144 * errors[2] > 0.0
 
 
-def test_a_ring_on_presliding_friction_has_a_hundredth_of_the_former_error(monkeypatch):
-    """Before, backward differences of second order followed every ring, with an error of 1 % of the drive's torque."""
+def test_a_ring_on_presliding_friction_is_followed_to_a_thousandth(monkeypatch):
+    """Backward differences of second order err by 1 % of the drive's torque and by several of the load's."""
     coarse = let_go(40, 14, mu=0.15, zeta=0.01)
     monkeypatch.setattr("ccmodel.model.general.run.RINGING_STEP_RAD", 0.01)
     monkeypatch.setattr("ccmodel.model.general.run.MOST_STEPS", 1024)

@@ -186,12 +186,12 @@ def prepared(
     elements: int,
     steps: int,
     series: NDArray,
-    rings: bool = False,
+    may_ring: bool = False,
 ) -> Prepared:
     """The pair before the first sample.
 
-    `series` is the load's prescribed torque or angle, shape (n,) or (1,). A load with mass may ring if `rings`: its
-    motion then has to follow from the drive's, and not the other way round.
+    `series` is the load's prescribed torque or angle, shape (n,) or (1,). A load with mass `may_ring` where its
+    motion follows from the drive's, and not the other way round.
     """
     grid = make_grid(transmission.path, elements, settings.kinks)
     load_laws = _load_laws(settings, load)
@@ -213,7 +213,7 @@ def prepared(
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
     drive = pulley_at(settings, "drive", transmission.drive_radius_m)
     of_ring, is_followed = _steps(physics, transmission, time_s)
-    physics, steps = physics._replace(rings=rings and is_followed), steps * of_ring
+    physics, steps = physics._replace(rings=may_ring and is_followed), steps * of_ring
     return Prepared(physics, piece, node, slide, mean, state, drive, friction_factor, steps)
 
 
@@ -233,7 +233,7 @@ def _marched(
 
     Parameters as of `prepared`.
     """
-    at = prepared(transmission, load, settings, time_s, theta_in, initial, elements, steps, series, rings=True)
+    at = prepared(transmission, load, settings, time_s, theta_in, initial, elements, steps, series, may_ring=True)
     state = at.physics, at.piece, at.node, at.slide, at.mean, at.load
     out = np.empty((len(OUTPUTS), time_s.size))
     drive = motor.angle_rad, motor.within_rad, at.drive
