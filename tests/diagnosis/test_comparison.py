@@ -31,7 +31,8 @@ from ccmodel.diagnosis.settings import (
     SCATTER,
     SETTLED,
 )
-from ccmodel.diagnosis.verdict import judge, nested_choice
+from ccmodel.diagnosis.verdict import judge, nested_choice, with_discretisation
+from ccmodel.failure import ModelError
 from ccmodel.inference.problem import Free
 from ccmodel.mechanisms import laws
 from made_observations import batch, calibrated
@@ -321,6 +322,73 @@ def test_a_wider_interval_is_no_support():
     assert by_interval.log_support(*SCALE) == pytest.approx(24.5)
     assert by_scatter.log_support(*SCALE) == pytest.approx(2 * np.log1p(100 / 3) - np.log(2))
     assert replace(by_interval, jackknife=scatter).log_support(*SCALE) == by_scatter.log_support(*SCALE)
+
+
+@pytest.mark.parametrize(("shift", "t2"), [(0.05, 1.0), (-0.05, 0.0), (0.0, 400.0)])
+def test_a_strength_that_a_finer_solver_changes_by_as_much_is_not_supported(shift, t2):
+    """Known to a twentieth on the usual solver, and twice as large or gone on the finer one."""
+    one = fitted(1.0, SCALE)
+    k = list(one.values).index("torque-scale/drive-sensor/gain")
+    covariance, moved = np.zeros((len(one.values),) * 2), np.zeros(len(one.values))
+    covariance[k, k], moved[k] = 0.0025**2, shift
+    support = replace(one, covariance=covariance, shift=moved).log_support(*SCALE)
+    assert support == pytest.approx(t2 / 2, rel=5e-3)
+    assert replace(one, covariance=covariance).log_support(*SCALE) == pytest.approx(200.0)
+
+
+def shifts(**by_name):
+    """`discretisation_shift` with a shift of each strength by its mechanism, as a share of it."""
+
+    def shift(candidate):
+        names = [key.split("/")[0].replace("-", "_") for key in candidate.values]
+        values = zip(names, candidate.values.values(), strict=True)
+        return np.array([by_name.get(name, 0.0) * value for name, value in values])
+
+    return shift
+
+
+def known_to(share, candidate):
+    """The candidate with each of its values known to a share of it."""
+    variances = [(share * value) ** 2 for value in candidate.values.values()]
+    return replace(candidate, covariance=np.diag(variances))
+
+
+def test_a_verdict_names_nothing_that_is_a_discretisation_error(monkeypatch):
+    friction, scale = (known_to(0.05, fitted(1.0, one)) for one in (FRICTION, SCALE))
+    found = verdict(evidence(), (friction, evidence(NONE)), (scale, evidence(NONE - 4)))
+    assert found.verdict == "explained"
+    monkeypatch.setattr(comparisons, "discretisation_shift", shifts())
+    stays, not_computed = with_discretisation(found)
+    assert (stays.verdict, stays.best.hypothesis, not_computed) == ("explained", found.best.hypothesis, [])
+    assert stays.best.shift is not None
+    monkeypatch.setattr(comparisons, "discretisation_shift", shifts(pulley_friction=1.0))
+    open_, _ = with_discretisation(found)
+    assert open_.verdict == "undecided"
+    assert 0.5 < open_.confidence_in("pulley-friction") < DECIDED
+
+
+def test_of_two_mechanisms_the_one_that_is_no_discretisation_error_is_named(monkeypatch):
+    """The part of a pair gets the discretisation error of its own values."""
+    alone = known_to(0.05, fitted(1.5, FRICTION)), evidence(NONE - 40.0, NONE - 45.0, size=0.5)
+    pair = known_to(0.05, fitted(1.0, FRICTION, SCALE)), evidence(NONE)
+    found = verdict(evidence(), alone, pair, model=fitted(61.0))
+    assert min(map(found.confidence_in, ("pulley-friction", "torque-scale"))) > DECIDED
+    monkeypatch.setattr(comparisons, "discretisation_shift", shifts(torque_scale=1.0))
+    later, _ = with_discretisation(found)
+    assert later.confidence_in("torque-scale") < 0.5
+    assert later.confidence_in("pulley-friction") > DECIDED
+    assert all(c.shift is not None for c in later.candidates)
+
+
+def test_a_finer_solver_that_fails_leaves_the_verdict_and_is_reported(monkeypatch):
+    def fails(candidate):
+        raise ModelError("no balance")
+
+    found = verdict(evidence(), (known_to(0.05, fitted(1.0, FRICTION)), evidence(NONE)))
+    monkeypatch.setattr(comparisons, "discretisation_shift", fails)
+    same, not_computed = with_discretisation(found)
+    assert same is found
+    assert [(n["what"], n["why"]) for n in not_computed] == [("discretisation error of the values", "no balance")]
 
 
 def test_the_strength_of_a_frozen_baselines_mechanism_is_its_change():
@@ -657,6 +725,43 @@ def test_a_law_and_a_mechanism_that_leave_much_may_be_two_laws(monkeypatch, left
     assert Selection({}, [], laws=[laws()[name] for name in names]).beside_law(found) is found
     assert proposed == ([(alone[0], [names[1]])] if is_tried else [])
     assert not screened
+
+
+def test_the_leading_set_is_the_largest_that_leads_on_or_else_a_pair():
+    kink, scale = (fitted(m, one) for m, one in ((60.0, KINK), (80.0, SCALE)))
+    pair, triple = fitted(40.0, KINK, SCALE), fitted(15.0, KINK, SCALE, FRICTION)
+    law = fitted(3.0, ("learned-sliding-friction-by-direction", "conduit"), KINK)
+
+    def leading(*candidates):
+        every = [(c, evidence(size=c.mean_square - 1.0)) for c in candidates]
+        return selections.leading_set(compared(evidence(size=99.0), *every, model=fitted(100.0)))
+
+    assert leading(kink, scale) is None
+    assert leading(kink, scale, pair, law) is pair
+    assert leading(kink, scale, pair, triple) is triple
+    assert leading(kink, scale, pair, fitted(30.0, KINK, SCALE, FRICTION)) is pair
+    assert leading(kink, scale, fitted(1.0, KINK, SCALE)) is None
+
+
+def test_a_mechanism_of_the_leading_set_may_have_another_form(monkeypatch):
+    """The kink's law is learned beside the friction, with which a single was fitted; the friction's beside nothing."""
+    names = ("learned-sliding-friction-bend-by-position-along-conduit", "learned-cable-stretch-by-tension")
+    of_bearing = "learned-bearing-torque-by-speed"
+    friction, pair = fitted(60.0, FRICTION), fitted(20.0, KINK, FRICTION)
+    every = [(c, evidence(size=c.mean_square - 1.0)) for c in (friction, pair)]
+    found, proposed, asked = compared(evidence(size=99.0), *every, model=fitted(100.0)), [], []
+
+    def propose(beside, own, *_):
+        proposed.append((beside, [law.name for law in own]))
+        return [Proposal(Hypothesis(((law.name, law.place),)), 1.0, {}) for law in own]
+
+    monkeypatch.setattr(selections, "proposals", propose)
+    monkeypatch.setattr(
+        Selection, "fit_all", lambda self, whitened, beside, chosen: asked.append((beside, chosen)) or []
+    )
+    Selection({}, [], laws=[laws()[name] for name in (*names, of_bearing)])._other_forms(found)
+    assert proposed == [(friction, [names[0]])]
+    assert [(beside, [s.hypothesis.names for s in chosen]) for beside, chosen in asked] == [(friction, [(names[0],)])]
 
 
 def test_of_two_laws_none_is_by_itself():

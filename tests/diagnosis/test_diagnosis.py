@@ -2,6 +2,7 @@
 
 import gzip
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +16,8 @@ from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from ccmodel.diagnosis.result import alternatives_of, identified, interval, mechanism_of
+from ccmodel.diagnosis.result import alternatives_of, interval, mechanism_of
+from ccmodel.diagnosis.verdict import identified
 from ccmodel.failure import ModelError
 from ccmodel.inference import pool
 from ccmodel.model.files import read_model_file
@@ -343,7 +345,7 @@ def test_a_number_stands_where_a_finer_solver_would_have_it():
             [],
             [],
         )
-        found[moved] = mechanism_of(candidate, 0, 0.9, np.array([moved]))["parameters"][0]
+        found[moved] = mechanism_of(replace(candidate, shift=np.array([moved])), 0, 0.9)["parameters"][0]
     plain, corrected = found[0.0], found[0.03]
     assert (plain["value"], corrected["value"]) == (0.5, pytest.approx(0.53))
     reach = plain["high"] - plain["value"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ccmodel import mechanisms
-from ccmodel.diagnosis.listed_laws import Learned, _is_comparable, distance, nearest_listed
+from ccmodel.diagnosis.listed_laws import Learned, distance, nearest_listed
 from ccmodel.mechanisms import laws
 from ccmodel.mechanisms.contract import Parameter
 from ccmodel.mechanisms.law_forms import CONSTANT_DRAG
@@ -240,7 +240,7 @@ def test_a_delay_is_said_of_its_end_and_compared_with_a_late_clock():
     assert nearest_listed(found)["name"] == "time-skew"
     x, _ = law.at_knots(found.values)
     kept = law.curve(x, np.full(x.size, 0.012), Parameter("strength", "1", 0.1, 3.0, 1.0, "size"))
-    assert distance(found, kept) < 1.2 and _is_comparable(law, kept)
+    assert distance(found, kept) < 1.2 and law.has_the_form_of(kept)
     stated = {"slot": law.slot, "place": law.place, "channel": None, "argument_is": "the time", "confidence": 0.9}
     curve = {"name": law.name, "curve": [[0.0, 0.0, 0.0, 0.0], [9.0, 0.012, 0.01, 0.02]], "argument_unit": "s"}
     text = law_claim(stated | curve | {"indistinguishable": [], "nearest_listed": None})

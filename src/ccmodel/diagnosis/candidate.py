@@ -82,6 +82,9 @@ class CandidateFit:
         Whether it came to a minimum.
     jackknife : tuple of ndarray, or None
         Covariance and degrees of freedom from the scatter between recordings alone; None if those above are these.
+    shift : ndarray, shape (unknowns,), or None
+        Change of the values on a finer solver (`discretisation_shift`), which is their discretisation error; None if it
+        was not computed.
     """
 
     hypothesis: Hypothesis
@@ -97,6 +100,7 @@ class CandidateFit:
     message: str = ""
     converged: bool = True
     jackknife: tuple[NDArray, NDArray] | None = None
+    shift: NDArray | None = None
 
     @cached_property
     def by_recording(self) -> NDArray:
@@ -167,14 +171,19 @@ class CandidateFit:
         """Whether its mechanisms' strengths lie within their plausible ranges."""
         return plausible(self.hypothesis, self.values)
 
-    def standard_deviations(self, shift: NDArray | float = 0.0) -> NDArray:
-        """Of each unknown, with a further error `shift` (of the discretisation, say); shape (unknowns,)."""
-        return np.hypot(np.sqrt(np.diag(self.covariance).clip(0.0)), shift)
+    @property
+    def discretisation(self) -> NDArray:
+        """Discretisation error of each value, 0 if it was not computed; shape (unknowns,)."""
+        return np.zeros(len(self.values)) if self.shift is None else self.shift
 
-    def half_widths(self, shift: NDArray | float = 0.0) -> NDArray:
+    def standard_deviations(self) -> NDArray:
+        """Of each unknown, the discretisation error included; shape (unknowns,)."""
+        return np.hypot(np.sqrt(np.diag(self.covariance).clip(0.0)), self.discretisation)
+
+    def half_widths(self) -> NDArray:
         """Half-width of each unknown's 90 % interval, shape (unknowns,)."""
         # With infinite degrees of freedom this is the normal distribution's quantile.
-        return student_quantile(0.5 + COVERAGE / 2, self.degrees_of_freedom) * self.standard_deviations(shift)
+        return student_quantile(0.5 + COVERAGE / 2, self.degrees_of_freedom) * self.standard_deviations()
 
     def log_support(self, name: str, place: str) -> float:
         """Log Bayes factor of a mechanism against its absence, from the scatter of its strength between recordings.
@@ -192,6 +201,9 @@ class CandidateFit:
 
         Where the interval is wider than the scatter, as that of an unknown with a prior may be, the lower support of
         the two counts: a wider interval has the degrees of freedom of all samples.
+
+        The discretisation error, once computed, is added to that of the strength. Of the strengths on the usual solver
+        and on the finer one, the one nearer to no effect counts.
         """
         support = self._log_support(name, place, self.covariance, self.degrees_of_freedom)
         return support if self.jackknife is None else min(support, self._log_support(name, place, *self.jackknife))
@@ -208,14 +220,16 @@ class CandidateFit:
         most = -np.inf
         for strength in mechanism.strengths:
             k = names.index(mechanism_key(name, place, strength.name))
-            whole = self.values[names[k]] - strength.neutral
+            of_both = self.values[names[k]] - strength.neutral + np.array([0.0, self.discretisation[k]])
+            whole = float(of_both[np.argmin(np.abs(of_both))])
             nu = float(degrees[k])
             # The derivatives of what is left: by the strength, and by each state.
             slopes = [float(left.prod()), *(-whole * float(np.delete(left, i).prod()) for i in range(left.size))]
             of_part = covariance[np.ix_([k, *states], [k, *states])]
             if nu - len(shapes) >= 1:
                 of_part, nu = _given(covariance, [k, *states], shapes), nu - len(shapes)
-            variance = np.array(slopes) @ of_part @ np.array(slopes)
+            moved = self.discretisation[[k, *states]]
+            variance = np.array(slopes) @ (of_part + np.outer(moved, moved)) @ np.array(slopes)
             if not variance > 0.0:
                 return np.inf
             most = max(most, _log_factor((whole * float(left.prod())) ** 2 / variance, nu))

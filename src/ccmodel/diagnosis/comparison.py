@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift
 from ccmodel.diagnosis.discrepancy import Discrepancy, Evidence, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis, laws_in
 from ccmodel.diagnosis.repeatability import (
@@ -100,6 +100,21 @@ class Comparison:
         ordered = sorted(lowest(candidates), key=_rank)
         found = replace(self, candidates=ordered, evidence={})
         return replace(found, evidence={c.hypothesis: found._evidence_of(c) for c in [self.base, *ordered]})
+
+    def with_discretisation(self, candidate: CandidateFit) -> "Comparison":
+        """The same with the discretisation error of a candidate's values, and of those of its parts (`part_of`).
+
+        Raises
+        ------
+        ModelError
+            If one of them cannot be run on the finer solver.
+        """
+        known: dict[Hypothesis, CandidateFit] = {}
+        part: CandidateFit | None = candidate
+        while part is not None and part is not self.base:
+            known[part.hypothesis] = replace(part, shift=discretisation_shift(part))
+            part = self.part_of(part)
+        return replace(self, candidates=[known.get(c.hypothesis, c) for c in self.candidates])
 
     def is_linearised_about(self, candidate: CandidateFit) -> bool:
         """Whether the covariance is linearised about these mechanisms, within a standard deviation of each value."""
@@ -212,7 +227,7 @@ class Comparison:
         share, smallest = self._left(candidate, part)
         if any(registry.get(name).drift == FRICTION_SCALE for name, _ in further):
             share = max(share, self._friction_left(candidate, part))
-        if larger is not None and (without := self._without(larger, further)) is not None:
+        if larger is not None and (without := self.without(larger, further)) is not None:
             share, smallest = min((share, smallest), self._left(larger, without))
         support = min(candidate.log_support(*one) for one in further)
         is_law = bool(laws_in(Hypothesis(tuple(further))))
@@ -247,7 +262,7 @@ class Comparison:
         """Whether a candidate's fit is good, and friction differs between recordings as from run to run."""
         return candidate.is_good and self.friction[candidate.hypothesis].log_factor > settings.FRICTION_SCATTERS
 
-    def _without(self, candidate: CandidateFit, members: set[tuple[str, str]]) -> CandidateFit | None:
+    def without(self, candidate: CandidateFit, members: set[tuple[str, str]]) -> CandidateFit | None:
         """The fitted candidate of the same mechanisms but for some; None if they were not fitted."""
         wanted = set(candidate.hypothesis.acting) - members
         return next((c for c in self.candidates if c.is_plausible and set(c.hypothesis.acting) == wanted), None)

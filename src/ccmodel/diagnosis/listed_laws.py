@@ -45,7 +45,7 @@ def nearest_listed(learned: Learned) -> dict[str, str | float | None] | None:
     twenty cases; None if that law has as many constants as the curve has coefficients, and meets every curve.
     """
     every = [(name, curve) for name in registry.names() for curve in registry.get(name).curves]
-    comparable = [(name, curve) for name, curve in every if _is_comparable(learned.law, curve)]
+    comparable = [(name, curve) for name, curve in every if learned.law.has_the_form_of(curve)]
     distances = [distance(learned, curve) for _, curve in comparable]
     if not distances:
         return None
@@ -58,11 +58,6 @@ def _limit(learned: Learned, curve: Curve) -> float | None:
     coefficients = len(learned.covariance)
     freedom = coefficients - len(curve.constants)
     return (chi2_quantile(settings.RECOGNISED, freedom) / coefficients) ** 0.5 if freedom > 0 else None
-
-
-def _is_comparable(law: Law, curve: Curve) -> bool:
-    is_same = (curve.slot, curve.argument, curve.form) == (law.slot, law.argument.name, law.form.name)
-    return is_same and (not curve.channels or law.channel in curve.channels)
 
 
 def distance(learned: Learned, curve: Curve) -> float:

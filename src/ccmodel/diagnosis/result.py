@@ -9,7 +9,7 @@ from ccmodel import mechanisms as registry
 from ccmodel.channels import short_name, unit_of
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import experiment, location, repeatability, settings
-from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift, fit, is_at_bound
+from ccmodel.diagnosis.candidate import CandidateFit, fit, is_at_bound
 from ccmodel.diagnosis.comparison import friction_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.law_report import laws_of
@@ -48,10 +48,9 @@ def report(
         When the isolation of a fault is given up.
     """
     best, base, whitened = judgement.best, judgement.calibrated, judgement.whitened
-    confidence = judgement.comparison.confidences(best.hypothesis)
-    of_list = identified(judgement.verdict, best.hypothesis, confidence)
+    confidence, of_list = judgement.confidences, judgement.identified
     named = [best.hypothesis.acting[k] for k in of_list]
-    shift, failures = _discretisation(judgement) if named else (None, [])
+    failures: NotJudged = []
     laws = laws_of(judgement)
     is_open = judgement.is_open or any(law["indistinguishable"] for law in laws)
     try:
@@ -59,14 +58,14 @@ def report(
     except OutOfTimeError:
         located = location.location(judgement, calibrated, isolating=False)
         why = "the limit was reached before the model was fitted without each channel"
-        failures = [*failures, {"what": "the place of the mismatch", "why": why}]
+        failures = [{"what": "the place of the mismatch", "why": why}]
     return {
         "format": FORMAT,
         "batch": batch,
         "verdict": judgement.verdict,
         "is_held": base.hypothesis.is_frozen,
         "location": located,
-        "mechanisms": [mechanism_of(best, k, _below_certainty(confidence[k]), shift) for k in of_list],
+        "mechanisms": [mechanism_of(best, k, _below_certainty(confidence[k])) for k in of_list],
         "laws": laws,
         "alternatives": alternatives_of(judgement, dict(named)),
         "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
@@ -87,17 +86,6 @@ def report(
             *failures,
         ],
     }
-
-
-def identified(verdict: str, hypothesis: Hypothesis, confidence: Sequence[float]) -> list[int]:
-    """Positions of the listed mechanisms that a verdict names, the highest confidence first.
-
-    An undecided verdict names those with at least the probability `DECIDED`: what is open is what else is missing.
-    """
-    least = {"explained": 0.0, "learned": 0.0, "undecided": settings.DECIDED}.get(verdict, np.inf)
-    listed = [k for k, (name, _) in enumerate(hypothesis.acting) if name not in registry.laws()]
-    named = (k for k in listed if confidence[k] >= least)
-    return sorted(named, key=lambda k: -min(settings.MOST_CONFIDENT, confidence[k]))
 
 
 def _nearest(judgement: Judgement, calibrated: CandidateFit) -> dict | None:
@@ -139,30 +127,21 @@ def _place_probability(acting: tuple[str, str], confidence: Mapping[Hypothesis, 
     return sum(p for hypothesis, p in confidence.items() if acting in hypothesis.acting)
 
 
-def _discretisation(judgement: Judgement) -> tuple[NDArray | None, NotJudged]:
-    """Shift of the best candidate's values on a finer solver, or the reason why there is none."""
-    try:
-        return discretisation_shift(judgement.best), []
-    except ModelError as error:
-        return None, [{"what": "discretisation error of the values", "why": str(error)}]
-
-
-def mechanism_of(candidate: CandidateFit, k: int, confidence: float, shift: NDArray | None = None) -> dict:
+def mechanism_of(candidate: CandidateFit, k: int, confidence: float) -> dict:
     """A mechanism's values, corrected for the discretisation error, with intervals that contain the correction.
 
     The model file keeps the values as fitted, which are the best on the solver that runs them.
     """
     name, place = candidate.hypothesis.acting[k]
     names = list(candidate.values)
-    shift = np.zeros(len(names)) if shift is None else shift
     free = candidate.hypothesis.free(candidate.values)
-    reach = _half_widths(candidate, free, shift)
+    reach = _half_widths(candidate, free)
     parameters = []
     mechanism = registry.get(name)
     for p in mechanism.parameters:
         key = mechanism_key(name, place, p.name)
         i, low, high = names.index(key), free[key].low, free[key].high
-        value = float(np.clip(candidate.values[key] + shift[i], low, high))
+        value = float(np.clip(candidate.values[key] + candidate.discretisation[i], low, high))
         is_relative = bool(mechanism.states) and p in mechanism.strengths
         ends = interval(value, float(reach[i]), is_relative)
         if is_relative:
@@ -175,12 +154,12 @@ def mechanism_of(candidate: CandidateFit, k: int, confidence: float, shift: NDAr
     return {"name": name, "place": place, "confidence": round(confidence, 4), "parameters": parameters}
 
 
-def _half_widths(candidate: CandidateFit, free: Mapping[str, Free], shift: NDArray) -> NDArray:
+def _half_widths(candidate: CandidateFit, free: Mapping[str, Free]) -> NDArray:
     """Half-widths of the unknowns' intervals; of one at its bound, at least that of the information.
 
     There it does not scatter between recordings, however little they show of it.
     """
-    reach = candidate.half_widths(shift)
+    reach = candidate.half_widths()
     at_bound = [name in free and is_at_bound(value, free[name]) for name, value in candidate.values.items()]
     if not any(at_bound):
         return reach

@@ -19,7 +19,7 @@ from ccmodel.diagnosis.observations import NotJudged, observations_of
 from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.result import report
 from ccmodel.diagnosis.selection import Selection
-from ccmodel.diagnosis.verdict import Judgement, judge
+from ccmodel.diagnosis.verdict import Judgement, judge, with_discretisation
 from ccmodel.diagnosis.whitening import Whitened, relinearised, whiten
 from ccmodel.inference.observations import Tolerance
 from ccmodel.inference.pool import each
@@ -232,7 +232,8 @@ def diagnose(
         why = f"{limit} was reached before all of them were fitted"
         unjudged.append({"what": "further candidates", "why": why})
     progress("deciding the verdict", SELECTED)
-    judgement = judge(comparison, scores)
-    progress("correcting the values for the discretisation, designing an experiment", JUDGED)
+    judgement, not_computed = with_discretisation(judge(comparison, scores))
+    unjudged += not_computed
+    progress("designing an experiment", JUDGED)
     content = report(recordings[0].batch, judgement, found.fit, tested.estimates, unjudged, reported_by)
     return Diagnosis(content, judgement, found.fit, tested.estimates)

@@ -7,13 +7,14 @@ from typing import Self
 
 import numpy as np
 
+from ccmodel import mechanisms as registry
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import LAST_SEARCH, SEARCH, VALUES_STAY, CandidateFit, evaluated, fit
 from ccmodel.diagnosis.comparison import Comparison, is_part_of, lowest
 from ccmodel.diagnosis.equation_error import other_start
 from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
-from ccmodel.diagnosis.laws import proposals
+from ccmodel.diagnosis.laws import Proposal, proposals
 from ccmodel.diagnosis.normal_equations import NormalEquations
 from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.screening import Score, Screening, screen
@@ -127,15 +128,19 @@ class Selection:
         return self.learn(found) if can_learn and not found.is_settled else found
 
     def learn(self, found: Comparison) -> Comparison:
-        """The same with laws that no list holds: the leading ones, and the best of them with more knots."""
-        base, least = found.base, least_evidence(found)
+        """The same with laws that no list holds: the leading ones, and the best of them with more knots.
+
+        If a set of listed mechanisms leads, each of them may have another form: its law is learned beside the others.
+        """
         self.progress("learning a law from the recordings", 0.0)
+        found = found.with_candidates([*found.candidates, *self._other_forms(found)])
+        base, least = found.base, least_evidence(found)
 
         def fitted(
             every: Sequence[Law], most: int, beside: CandidateFit = base, least: float = -np.inf
         ) -> list[CandidateFit]:
             proposed = proposals(beside, every, self.deadline, self.progress, self.known)
-            leading = [Score(p.hypothesis, 0.0, p.values) for p in proposed if p.evidence > least][:most]
+            leading = _as_scores(p for p in proposed if p.evidence > least)[:most]
             first, others = leading[: settings.PARTNERS], leading[settings.PARTNERS :]
             found_first = self.fit_all(found.whitened, beside, first)
             if not others or are_hopeless(found_first, found):
@@ -152,6 +157,20 @@ class Selection:
             return found
         found = self.relinearise(found)
         return self.beside_law(found) if law_of(found.leading[0].hypothesis) is not None else found
+
+    def _other_forms(self, found: Comparison) -> list[CandidateFit]:
+        """The leading set with the law of one of its mechanisms learned, at the slot and of the argument it has."""
+        best, learned = leading_set(found), list[CandidateFit]()
+        if best is None:
+            return learned
+        for name, place in best.hypothesis.acting:
+            curves = registry.get(name).curves
+            own = [law for law in self.laws if law.place == place and any(map(law.has_the_form_of, curves))]
+            others = found.without(best, {(name, place)}) if own else None
+            if others is not None:
+                proposed = proposals(others, own, self.deadline, self.progress, self.known)
+                learned += self.fit_all(found.whitened, others, _as_scores(proposed[:1]))
+        return learned
 
     def with_laws(self, found: Comparison, beside: CandidateFit, learned: Sequence[CandidateFit]) -> Comparison:
         """The same with laws beside a model, which counts as compared with them if there was time for all."""
@@ -174,7 +193,7 @@ class Selection:
         scores = self._screened(best, self.mechanisms).singles() if best is leading else []
         scores = [s for s in scores if s.gain > settings.WORTH_FITTING]
         second = proposals(best, others, self.deadline, self.progress, self.known)[: settings.PARTNERS]
-        chosen = scores[: settings.PARTNERS] + [Score(p.hypothesis, 0.0, p.values) for p in second]
+        chosen = scores[: settings.PARTNERS] + _as_scores(second)
         pairs = self.fit_all(found.whitened, best, chosen)
         return self.relinearise(found.with_candidates([*found.candidates, *pairs])) if pairs else found
 
@@ -339,6 +358,11 @@ class Selection:
         return found.with_candidates(list(every.values()))
 
 
+def _as_scores(proposed: Iterable[Proposal]) -> list[Score]:
+    """Proposed laws as starts of a fit."""
+    return [Score(p.hypothesis, 0.0, p.values) for p in proposed]
+
+
 def _scores(again: Iterable[CandidateFit]) -> list[Score]:
     """Fitted candidates as starts of another fit."""
     return [Score(c.hypothesis, 0.0, c.values) for c in again]
@@ -381,6 +405,14 @@ def hides_a_law(found: Comparison) -> CandidateFit | None:
 def _listed(found: Comparison) -> list[CandidateFit]:
     """Plausible sets of listed mechanisms, by ascending mean square."""
     return [c for c in found.candidates if c.is_plausible and law_of(c.hypothesis) is None]
+
+
+def leading_set(found: Comparison) -> CandidateFit | None:
+    """The listed set that leaves least, if it leaves something: of the largest size that leads on, or else of two."""
+    size = next((size for size in range(settings.MOST_MECHANISMS, 2, -1) if found.leads_on(size)), 2)
+    sets = [c for c in _listed(found) if c.hypothesis.size == size]
+    best = min(sets, key=found.unexplained_mean_square, default=found.base)
+    return best if sets and found.unexplained_mean_square(best) > 0.0 else None
 
 
 def law_by_itself(found: Comparison, candidate: CandidateFit) -> CandidateFit | None:

@@ -6,13 +6,16 @@ from math import exp
 
 import numpy as np
 
+from ccmodel import mechanisms as registry
 from ccmodel.channels import PLACES_OF
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.comparison import Comparison
 from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
+from ccmodel.diagnosis.observations import NotJudged
 from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.whitening import Whitened
+from ccmodel.failure import ModelError
 from ccmodel.mechanisms.learned import Law
 
 
@@ -59,6 +62,16 @@ class Judgement:
     def whitened(self) -> Sequence[Whitened]:
         """The observations of the comparison."""
         return self.comparison.whitened
+
+    @property
+    def confidences(self) -> list[float]:
+        """Probability of each mechanism of the best candidate, in its order."""
+        return self.comparison.confidences(self.best.hypothesis)
+
+    @property
+    def identified(self) -> list[int]:
+        """Positions of the best candidate's mechanisms that the verdict names (`identified`)."""
+        return identified(self.verdict, self.best.hypothesis, self.confidences)
 
     @property
     def confidence(self) -> dict[Hypothesis, float]:
@@ -119,6 +132,32 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     # Whether its last member is missing or imitates something, the set with the highest evidence predicts best.
     best = next((c for c in comparison.by_evidence if law_of(c.hypothesis) is None), comparison.base)
     return replace(found, verdict="undecided", best=best)
+
+
+def identified(verdict: str, hypothesis: Hypothesis, confidence: Sequence[float]) -> list[int]:
+    """Positions of the listed mechanisms that a verdict names, the highest confidence first.
+
+    An undecided verdict names those with at least the probability `DECIDED`: what is open is what else is missing.
+    """
+    least = {"explained": 0.0, "learned": 0.0, "undecided": settings.DECIDED}.get(verdict, np.inf)
+    listed = [k for k, (name, _) in enumerate(hypothesis.acting) if name not in registry.laws()]
+    named = (k for k in listed if confidence[k] >= least)
+    return sorted(named, key=lambda k: -min(settings.MOST_CONFIDENT, confidence[k]))
+
+
+def with_discretisation(judgement: Judgement) -> tuple[Judgement, NotJudged]:
+    """The verdict once the values of what it names have their discretisation error, and what was not computed.
+
+    A strength that is no larger than this error does not support its mechanism. The verdict may then name others, whose
+    values need theirs.
+    """
+    while judgement.identified and judgement.best.shift is None:
+        try:
+            comparison = judgement.comparison.with_discretisation(judgement.best)
+        except ModelError as error:
+            return judgement, [{"what": "discretisation error of the values", "why": str(error)}]
+        judgement = judge(comparison, judgement.scores)
+    return judgement, []
 
 
 def _is_explained(judgement: Judgement, best: CandidateFit) -> bool:

@@ -271,6 +271,11 @@ class Law:
         is_same_sensor = self.slot != SENSOR_MAP or self.channel == other.channel
         return (self.slot, self.place) == (other.slot, other.place) and is_same_sensor
 
+    def has_the_form_of(self, curve: Curve) -> bool:
+        """Whether the law that a listed mechanism has at a slot is one of this slot, argument and form."""
+        is_same = (curve.slot, curve.argument, curve.form) == (self.slot, self.argument.name, self.form.name)
+        return is_same and (not curve.channels or self.channel in curve.channels)
+
     def has_the_quantity_of(self, other: "Law") -> bool:
         """Whether it is the other law, with as many knots or not."""
         return replace(self, resolution=other.resolution) == other
