@@ -759,7 +759,7 @@ def test_a_mechanism_of_the_leading_set_may_have_another_form(monkeypatch):
     monkeypatch.setattr(
         Selection, "fit_all", lambda self, whitened, beside, chosen: asked.append((beside, chosen)) or []
     )
-    Selection({}, [], laws=[laws()[name] for name in (*names, of_bearing)])._other_forms(found)
+    Selection({}, [], laws=[laws()[name] for name in (*names, of_bearing)])._other_forms(found, pair)
     assert proposed == [(friction, [names[0]])]
     assert [(beside, [s.hypothesis.names for s in chosen]) for beside, chosen in asked] == [(friction, [(names[0],)])]
 

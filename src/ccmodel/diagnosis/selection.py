@@ -130,11 +130,11 @@ class Selection:
     def learn(self, found: Comparison) -> Comparison:
         """The same with laws that no list holds: the leading ones, and the best of them with more knots.
 
-        If a set of listed mechanisms leads, each of them may have another form: its law is learned beside the others.
+        If no law leaves nothing, a mechanism of the leading listed set may have another form: its law is learned beside
+        the others.
         """
         self.progress("learning a law from the recordings", 0.0)
-        found = found.with_candidates([*found.candidates, *self._other_forms(found)])
-        base, least = found.base, least_evidence(found)
+        base, least, leading = found.base, least_evidence(found), leading_set(found)
 
         def fitted(
             every: Sequence[Law], most: int, beside: CandidateFit = base, least: float = -np.inf
@@ -150,6 +150,8 @@ class Selection:
         first = sorted(fitted(self.laws, settings.LAWS_FITTED, least=least), key=lambda c: c.mean_square)
         finer = [] if are_hopeless(first, found) else finer_laws([c.hypothesis for c in first])
         found = self.with_laws(found, base, first + fitted(finer, settings.LAWS_REFINED, least=least))
+        if leading is not None and not found.leading_law_leaves_nothing:
+            found = found.with_candidates([*found.candidates, *self._other_forms(found, leading)])
         beside = hides_a_law(found)
         if beside is not None:
             found = self.with_laws(found, beside, fitted(self.laws, settings.PARTNERS, beside))
@@ -158,11 +160,9 @@ class Selection:
         found = self.relinearise(found)
         return self.beside_law(found) if law_of(found.leading[0].hypothesis) is not None else found
 
-    def _other_forms(self, found: Comparison) -> list[CandidateFit]:
-        """The leading set with the law of one of its mechanisms learned, at the slot and of the argument it has."""
-        best, learned = leading_set(found), list[CandidateFit]()
-        if best is None:
-            return learned
+    def _other_forms(self, found: Comparison, best: CandidateFit) -> list[CandidateFit]:
+        """A listed set with the law of one of its mechanisms learned, at the slot and of the argument that it has."""
+        learned: list[CandidateFit] = []
         for name, place in best.hypothesis.acting:
             curves = registry.get(name).curves
             own = [law for law in self.laws if law.place == place and any(map(law.has_the_form_of, curves))]
