@@ -740,7 +740,7 @@ def test_the_leading_set_is_the_largest_that_leads_on_or_else_a_pair():
     assert leading(kink, scale, pair, law) is pair
     assert leading(kink, scale, pair, triple) is triple
     assert leading(kink, scale, pair, fitted(30.0, KINK, SCALE, FRICTION)) is pair
-    assert leading(kink, scale, fitted(1.0, KINK, SCALE)) is None
+    assert leading(kink, scale, fitted(1.4, KINK, SCALE)) is None
 
 
 def test_a_mechanism_of_the_leading_set_may_have_another_form(monkeypatch):

@@ -408,11 +408,11 @@ def _listed(found: Comparison) -> list[CandidateFit]:
 
 
 def leading_set(found: Comparison) -> CandidateFit | None:
-    """The listed set that leaves least, if it leaves something: of the largest size that leads on, or else of two."""
+    """The listed set that leaves least, of the largest size that leads on or else of two; None if its fit is good."""
     size = next((size for size in range(settings.MOST_MECHANISMS, 2, -1) if found.leads_on(size)), 2)
     sets = [c for c in _listed(found) if c.hypothesis.size == size]
     best = min(sets, key=found.unexplained_mean_square, default=found.base)
-    return best if sets and found.unexplained_mean_square(best) > 0.0 else None
+    return best if sets and not found.is_good(best) else None
 
 
 def law_by_itself(found: Comparison, candidate: CandidateFit) -> CandidateFit | None:
