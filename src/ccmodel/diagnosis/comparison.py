@@ -112,7 +112,8 @@ class Comparison:
         known: dict[Hypothesis, CandidateFit] = {}
         part: CandidateFit | None = candidate
         while part is not None and part is not self.base:
-            known[part.hypothesis] = replace(part, shift=discretisation_shift(part))
+            if part.shift is None:
+                known[part.hypothesis] = replace(part, shift=discretisation_shift(part))
             part = self.part_of(part)
         return replace(self, candidates=[known.get(c.hypothesis, c) for c in self.candidates])
 
