@@ -36,7 +36,7 @@ from ccmodel.steps.ingest import ingest
 from ccmodel.steps.settings import Fit
 from ccmodel.steps.simulate import simulate, simulate_recording
 from ccmodel.studies.settings import EACH
-from virtualrig.campaign import as_yaml, compress, describe, log_name, prepare, recording_generator, run
+from virtualrig.campaign import as_yaml, compress, describe, log_name, prepare, recording_generator, rig_during, run
 from virtualrig.config import Campaign, read_campaign
 from virtualrig.sensors import log
 from virtualrig.trajectory import Trajectory
@@ -130,7 +130,7 @@ def record_again(campaign: Campaign, truth: Mapping, noise_seed: int, raw: Path)
         (raw / batch / "batch.yaml").write_text(as_yaml(describe(campaign, batch)), encoding="utf-8")
         for plan in campaign.batches[batch].recordings:
             draw = np.random.default_rng([noise_seed, zlib.crc32(f"{batch}/{plan.id}".encode())])
-            columns = log(truth[batch, plan.id], sensors, campaign.rig, draw)
+            columns = log(truth[batch, plan.id], sensors, rig_during(campaign, plan), draw)
             (raw / batch / log_name(plan)).write_bytes(compress(columns))
 
 

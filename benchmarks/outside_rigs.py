@@ -37,7 +37,7 @@ from proof.build import noise_floor, simulate
 from proof.plan import read_plan
 from proof.recording_draw import Conditions, draw_held_out, draw_recordings
 from proof.rig_draw import draw_campaign, log_uniform, rounded
-from virtualrig.campaign import as_yaml, compress, description, log_name, prepare, recording_generator
+from virtualrig.campaign import as_yaml, compress, description, log_name, prepare, recording_generator, rig_during
 from virtualrig.config import Campaign, Piece, RecordingPlan
 from virtualrig.effects import Effects, merged
 from virtualrig.sensors import log
@@ -302,7 +302,7 @@ def _record(
         preparation = prepare(campaign, plan, random)
         trajectory = simulate(campaign, case.true(plan), preparation)
         runs[plan.id] = preparation, trajectory
-        read = log(case.seeded.trajectory(trajectory), campaign.sensors, campaign.rig, random)
+        read = log(case.seeded.trajectory(trajectory), campaign.sensors, rig_during(campaign, plan), random)
         (folder / log_name(plan)).write_bytes(compress(read))
     note = "recordings of a simulated rig; its physics is not disclosed"
     (folder / "batch.yaml").write_text(as_yaml(description(campaign, case.name, note, plans)), encoding="utf-8")

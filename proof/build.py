@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proof.cases import Case
-from virtualrig.campaign import as_yaml, compress, description, log_name, prepare, recording_generator, run
+from virtualrig.campaign import as_yaml, compress, description, log_name, prepare, recording_generator, rig_during, run
 from virtualrig.config import Campaign, LoadCell, RecordingPlan, Repeatability, TorqueSensor
 from virtualrig.motion import Excitation, smooth_step
 from virtualrig.sensors import log, sensed_sides
@@ -212,7 +212,8 @@ def record(
         preparation = prepare(campaign, plan, draw)
         trajectory = simulate(campaign, plan, preparation)
         runs[plan.id] = preparation, trajectory
-        (folder / log_name(plan)).write_bytes(compress(log(trajectory, campaign.sensors, campaign.rig, draw)))
+        columns = log(trajectory, campaign.sensors, rig_during(campaign, plan), draw)
+        (folder / log_name(plan)).write_bytes(compress(columns))
     described = description(campaign, case.name, NOTE, plans)
     (folder / "batch.yaml").write_text(as_yaml(described), encoding="utf-8")
     return runs

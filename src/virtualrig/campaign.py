@@ -15,8 +15,9 @@ from numpy.random import Generator, SeedSequence
 from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
-from virtualrig.config import BatchPlan, Campaign, RecordingPlan, Repeatability
+from virtualrig.config import BatchPlan, Campaign, RecordingPlan, Repeatability, Rig
 from virtualrig.dynamics import simulate
+from virtualrig.effects import SideSensors
 from virtualrig.grid import make_grid
 from virtualrig.sensors import DECIMALS, log
 from virtualrig.trajectory import Preparation, Trajectory
@@ -85,7 +86,7 @@ def record(campaign: Campaign, batch: str, plan: RecordingPlan) -> bytes:
     draw = recording_generator(campaign.seed, batch, plan.id)
     preparation = prepare(campaign, plan, draw)
     trajectory = run(campaign, plan, preparation)
-    return compress(log(trajectory, campaign.sensors, campaign.rig, draw))
+    return compress(log(trajectory, campaign.sensors, rig_during(campaign, plan), draw))
 
 
 def recording_generator(seed: int, batch: str, recording: str) -> Generator:
@@ -122,10 +123,26 @@ def run(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> Tr
     time_s = np.arange(round(plan.excitation.duration_s * rate) + 1) / rate
     numerics = campaign.numerics
     grid = make_grid(plan.conduit, numerics.cell_length_m, numerics.cell_bend_rad)
-    drifted = 1 + campaign.rig.effects.stiffness_drift * plan.position
-    cable = campaign.rig.cable.model_copy(update={"stiffness_N_per_m": drifted * campaign.rig.cable.stiffness_N_per_m})
-    rig = campaign.rig.model_copy(update={"cable": cable})
-    return simulate(rig, grid, numerics, preparation, time_s, plan.excitation.angle_and_rate(time_s))
+    motion = plan.excitation.angle_and_rate(time_s)
+    return simulate(rig_during(campaign, plan), grid, numerics, preparation, time_s, motion)
+
+
+def rig_during(campaign: Campaign, plan: RecordingPlan) -> Rig:
+    """The rig with the stiffness and the zeros of the load cells as they are in one recording."""
+    rig, effects = campaign.rig, campaign.rig.effects
+    stiffness = (1 + effects.stiffness_drift * plan.position) * rig.cable.stiffness_N_per_m
+    sides = {side: _drifted(getattr(effects, side), plan.position) for side in ("drive_sensors", "load_sensors")}
+    return rig.model_copy(
+        update={
+            "cable": rig.cable.model_copy(update={"stiffness_N_per_m": stiffness}),
+            "effects": effects.model_copy(update=sides),
+        }
+    )
+
+
+def _drifted(sensors: SideSensors, position: float) -> SideSensors:
+    offset_N = sensors.load_cell_offset_N + sensors.load_cell_zero_drift_N * position
+    return sensors.model_copy(update={"load_cell_offset_N": offset_N, "load_cell_zero_drift_N": 0.0})
 
 
 def compress(columns: dict[str, NDArray]) -> bytes:

@@ -36,6 +36,7 @@ from ccmodel.diagnosis.settings import MOST_SCATTER, SPREAD_FREEDOM, TREND_LEVEL
 from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.diagnosis.whitening import relinearised, whiten
 from ccmodel.inference.observations import Observations
+from ccmodel.model.active import Active
 
 # Significance level of these tests: no clean batch with the stated spread (1 %) scatters too much.
 SCATTER_LEVEL = 0.005
@@ -264,6 +265,19 @@ def test_recordings_that_deviate_from_the_others_are_few_and_clearly_apart():
     # What the errors of the estimates account for is no deviation.
     assert deviating(observed([6.0, *rest[1:]])) == [0]
     assert deviating(observed([6.0, *rest[1:]], variance=9.0)) == []
+
+
+@pytest.mark.parametrize(("order", "scatters"), [((0, 1, 2, 3, 4, 5, 6), False), ((3, 6, 1, 5, 0, 4, 2), True)])
+def test_a_zero_that_drifts_through_the_repeats_of_a_condition_does_not_scatter(order, scatters):
+    offsets = np.linspace(-1.0, 1.0, 7)[list(order)]
+    truths = [
+        replace(made.PARAMETERS, mechanisms=(Active("load-cell-offset", "load-sensor", {"offset": offset}),))
+        for offset in offsets
+    ]
+    recordings = [made.whitened(0.6, 1.0, 7.0, seed=k, truth=truth) for k, truth in enumerate(truths)]
+    _, found = calibrated(recordings)
+    assert (found.ratio("F_load_zero_N") > 2) == scatters
+    assert found.ratio("F_drive_zero_N") < 1.1
 
 
 def test_recordings_are_rarely_said_to_deviate_from_run_to_run():

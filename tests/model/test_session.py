@@ -17,6 +17,7 @@ from ccmodel.recording import in_order, read_recordings, write_recordings
 PARAMETERS = Parameters(9000.0, 1.2, 0.15, 0.006, 0.006, 0.05)
 FRICTION = Active("friction-drift", "conduit", {"change": 0.2})
 STIFFNESS = Active("stiffness-drift", "cable", {"change": -0.1})
+ZERO = Active("zero-drift", "load-sensor", {"change": 0.6})
 RELAXATION = Active("relaxation", "cable", {"r": 0.1, "tau": 20.0, "relaxed": 0.5})
 
 
@@ -90,6 +91,32 @@ def test_two_drifts_act_together():
     both = of_recording(replace(PARAMETERS, mechanisms=(FRICTION, STIFFNESS)), replace(recording(), position=-0.5))
     assert (both.friction, both.stiffness_N_per_m) == pytest.approx((0.9 * 0.15, 1.05 * 9000.0))
     assert both.mechanisms == ()
+
+
+def test_a_drifting_zero_is_an_offset_of_the_same_cell_in_each_recording():
+    """Bit for bit; the cell of the other end, and every other sensor, reads what it read."""
+    last = ModelInput.of(replace(recording(), position=0.5))
+    offset = replace(ZERO, name="load-cell-offset", values={"offset": 0.3})
+    drifted, plain = (simulate(last, replace(PARAMETERS, mechanisms=(one,))) for one in (ZERO, offset))
+    for channel in plain.channels:
+        assert (drifted[channel] == plain[channel]).all(), channel
+    paper = simulate(last, PARAMETERS)
+    assert drifted["F_load_N"] - drifted["F_drive_N"] == pytest.approx(paper["F_load_N"] - paper["F_drive_N"] + 0.3)
+    middle = of_recording(replace(PARAMETERS, mechanisms=(ZERO,)), recording())
+    assert middle.mechanisms == (replace(offset, values={"offset": 0.0}),)
+
+
+def test_a_drifting_zero_and_an_offset_add_up():
+    parts = (replace(ZERO, name="load-cell-offset", values={"offset": 0.5}), ZERO)
+    for mechanisms in (parts, parts[::-1]):
+        (found,) = of_recording(
+            replace(PARAMETERS, mechanisms=mechanisms), replace(recording(), position=-0.5)
+        ).mechanisms
+        assert (found.name, found.place) == ("load-cell-offset", "load-sensor")
+        assert found.values["offset"] == pytest.approx(0.2)
+    elsewhere = (replace(parts[0], place="drive-sensor"), ZERO)
+    both = of_recording(replace(PARAMETERS, mechanisms=elsewhere), replace(recording(), position=-0.5)).mechanisms
+    assert [(m.place, m.values["offset"]) for m in both] == [("drive-sensor", 0.5), ("load-sensor", -0.3)]
 
 
 def test_a_state_follows_from_stated_times():

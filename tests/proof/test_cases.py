@@ -239,7 +239,7 @@ def test_the_repeat_of_the_noise_floor_begins_with_the_tensions_of_the_run():
     assert repeated.profile_curvature != prepared.profile_curvature
 
 
-@pytest.mark.parametrize("effect", ["friction-drift", "stiffness-drift"])
+@pytest.mark.parametrize("effect", ["friction-drift", "stiffness-drift", "zero-drift"])
 def test_a_drift_is_recorded_more_than_once(effect):
     cases = [draw(seed, "poor", effect) for seed in range(20)]
     assert {len(case.recordings) > 1 for case in cases} == {True}

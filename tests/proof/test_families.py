@@ -53,7 +53,7 @@ def test_the_laws_that_the_list_never_had_are_of_many_slots_and_arguments():
 WITHOUT_TABLE = {"constant-drag", "kink", "viscous-friction", "presliding"}
 # What no slot can hold is scored on its place.
 WITHOUT_SLOT = {
-    *("conduit-compliance", "relaxation", "friction-drift", "stiffness-drift"),
+    *("conduit-compliance", "relaxation", "friction-drift", "stiffness-drift", "zero-drift"),
     # A constant is a law of any argument.
     *("time-skew", "load-cell-offset"),
 }

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from virtual_runs import changed, channels, plan_of, strung
 
 from virtualrig import dynamics, effect_dynamics, effect_march
-from virtualrig.campaign import prepare, run
+from virtualrig.campaign import prepare, rig_during, run
 from virtualrig.config import Campaign
 from virtualrig.effects import TWINS, Effects
 from virtualrig.grid import make_grid
@@ -409,6 +409,16 @@ def test_all_effects_together_run_through_every_motion(coarse):
     for name in (*TENSIONS, "theta_out_rad", "tau_in_Nm", "tau_out_Nm"):
         assert np.isfinite(getattr(t, name)).all()
     assert np.ptp(t.theta_out_rad) > 0.1
+
+
+def test_the_zero_of_a_load_cell_drifts_from_recording_to_recording(coarse):
+    effects = Effects(load_sensors={"load_cell_offset_N": 0.5, "load_cell_zero_drift_N": -0.4})
+    rig = changed(coarse, rig__effects=effects)
+    plan = plan_of(rig, "half-loop", "half-loop-7.3N-a", rest_s=0.05, start_up_cycles=0.25, cycles=0.5)
+    offsets = [rig_during(rig, plan.model_copy(update={"position": x})).effects.load_sensors for x in (-0.5, 0, 0.5)]
+    assert [of.load_cell_offset_N for of in offsets] == pytest.approx([0.7, 0.5, 0.3])
+    assert not any(of.load_cell_zero_drift_N for of in offsets)
+    assert rig_during(coarse, plan) == coarse.rig
 
 
 def test_sensors_err_as_they_are_told(campaign):

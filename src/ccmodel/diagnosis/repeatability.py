@@ -170,7 +170,7 @@ def estimated(whitened: Sequence["Whitened"], residuals: Sequence[NDArray]) -> R
         if name in _WORDS:
             found[name] = relative_spread(name, without_trend(of_name, sequences(whitened)), groups)
         elif name in _CHANNEL_OF:
-            found[name] = zero_spread(name, of_name, groups)
+            found[name] = zero_spread(name, without_trend(of_name, sequences(whitened)), groups)
     return Repeatability(found, groups)
 
 

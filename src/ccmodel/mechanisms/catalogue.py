@@ -169,7 +169,10 @@ def _role(mechanism: Mechanism) -> str:
     if mechanism.modifies_observation is not None:
         role = "It modifies the observation: the sensors' readings after a run."
     elif mechanism.drift is not None:
-        role = f"It drifts the model's `{mechanism.drift}` from recording to recording."
+        drifting = (
+            f"[{mechanism.drift}]({mechanism.drift}.md)" if mechanism.drift in names() else f"`{mechanism.drift}`"
+        )
+        role = f"It drifts the model's {drifting} from recording to recording."
     else:
         settings = ", ".join(f"`{name}`" for name in mechanism.neutral_settings)
         role = f"It modifies the physics: the general solver's {settings}."

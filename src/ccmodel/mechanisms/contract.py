@@ -242,7 +242,8 @@ class Mechanism:
     modifies_observation : callable or None
         ``modifies_observation(sensing, place, values)`` returns the channels that change.
     drift : str or None
-        The parameter of the model that its ``change`` drifts through a session.
+        What its ``change`` drifts through a session: a parameter of the model, by that share, or the only parameter of
+        another mechanism at the same place, by that amount.
     states_after_tensioning : callable or None
         ``states_after_tensioning(seconds, values)``: its states, by name, at a time after the cables were tensioned.
     curves : tuple of Curve

@@ -1,4 +1,4 @@
-"""What changes slowly from recording to recording of a session: friction, and the stiffness of the cables."""
+"""What changes slowly from recording to recording of a session: friction, stiffness, and the zero of a load cell."""
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -65,4 +65,32 @@ def stiffness_drift() -> Mechanism:
     )
 
 
-MECHANISMS = (friction_drift(), stiffness_drift())
+def zero_drift() -> Mechanism:
+    """A load cell's zero drifts from recording to recording of a session.
+
+    Equation: The cell reads F + change x throughout a recording at the position x in its session, as for
+    friction-drift: by the stated times, or by the order of the batch file as a hypothesis.
+
+    Signature: One force sum disagrees with all other channels, also with the torque on the same side, by a constant
+    that grows or falls from recording to recording.
+
+    Separated by: the first condition recorded again at the session's end; the cell without load between recordings.
+
+    Source: JCGM 200:2012, International vocabulary of metrology, 2012, doi:10.59161/JCGM200-2012, 4.21 (instrumental
+    drift).
+    """
+    meaning = "change of the zero from the session's first recording to its last"
+    return Mechanism(
+        name="zero-drift",
+        text=zero_drift.__doc__ or "",
+        tex=r"F_\mathrm{read}(x) = F + \mathrm{change}\,x, \qquad -0.5 \le x \le 0.5",
+        sentence="the zero of the {side}'s load cell [rises|falls] by {change} from the first recording to the last",
+        places=("drive-sensor", "load-sensor"),
+        parameters=(Parameter("change", "N", 0.2, 3.0, 0.5, meaning, signed=True),),
+        mistaken_for=("load-cell-offset", "load-cell-drift"),
+        depends_on_time=False,
+        drift="load-cell-offset",
+    )
+
+
+MECHANISMS = (friction_drift(), stiffness_drift(), zero_drift())

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ccmodel import mechanisms as registry
-from ccmodel.model.active import active_of
+from ccmodel.model.active import Active, active_of
 from ccmodel.model.parameters import Parameters, mechanism_key
 from ccmodel.recording import Recording
 
@@ -47,7 +47,8 @@ def known_states(recording: Recording, parameters: Parameters) -> dict[str, floa
 def of_recording(parameters: Parameters, recording: Recording) -> Parameters:
     """Parameters in one recording: with the states that it begins at, and drifted to its place in the session.
 
-    A drift is done when it has changed the parameters: it stands no longer among their mechanisms.
+    A drift is done when it has changed the parameters, or a mechanism that does not drift: it stands no longer among
+    their mechanisms.
     """
     if not parameters.mechanisms:
         return parameters
@@ -58,9 +59,20 @@ def of_recording(parameters: Parameters, recording: Recording) -> Parameters:
     if not drifts:
         return parameters
     position = position_of(recording, parameters)
-    kept = tuple(m for m in parameters.mechanisms if m not in drifts)
+    kept = [m for m in parameters.mechanisms if m not in drifts]
     values: dict[str, float] = {}
     for m in drifts:
-        name = str(registry.get(m.name).drift)
-        values[name] = values.get(name, parameters.value_of(name)) * (1 + m.values["change"] * position)
-    return replace(parameters.with_values(values), mechanisms=kept)
+        name, change = str(registry.get(m.name).drift), m.values["change"] * position
+        if name in registry.names():
+            kept = _shifted(kept, name, m.place, change)
+        else:
+            values[name] = values.get(name, parameters.value_of(name)) * (1 + change)
+    return replace(parameters.with_values(values), mechanisms=tuple(kept))
+
+
+def _shifted(mechanisms: Sequence[Active], name: str, place: str, change: float) -> list[Active]:
+    """Mechanisms with the only parameter of one of them changed; it is added if it is not there."""
+    (parameter,) = registry.get(name).parameters
+    before = next((m.values[parameter.name] for m in mechanisms if (m.name, m.place) == (name, place)), 0.0)
+    others = [m for m in mechanisms if (m.name, m.place) != (name, place)]
+    return [*others, Active(name, place, {parameter.name: before + change})]

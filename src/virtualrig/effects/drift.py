@@ -1,6 +1,7 @@
-"""Drift from recording to recording: friction or stiffness times 1 + change x, x a recording's place in its session.
+"""Drift from recording to recording of a session, in proportion to a recording's place x in it.
 
-It is constant within a recording (`virtualrig.campaign.prepare` and `run`).
+Friction and stiffness are times 1 + change x, and the zero of a load cell is off by change x. All are constant within a
+recording (`virtualrig.campaign.prepare` and `rig_during`).
 """
 
 from collections.abc import Mapping
@@ -8,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from virtualrig.effects.contract import Seeded, Twin
+from virtualrig.effects.contract import Seeded, Twin, group_of
 
 Change = Annotated[float, Field(gt=-2, lt=2)]
 
@@ -29,4 +30,21 @@ def _twin(what: str, place: str) -> Twin:
     )
 
 
-TWINS = (_twin("friction", "conduit"), _twin("stiffness", "cable"))
+def _seed_zero(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    return {group_of(place): {"load_cell_zero_drift_N": size}}, {"change": size}
+
+
+TWINS = (
+    _twin("friction", "conduit"),
+    _twin("stiffness", "cable"),
+    Twin(
+        name="zero-drift",
+        fields={"sensors": {"load_cell_zero_drift_N": (float, 0.0)}},
+        places=("drive-sensor", "load-sensor"),
+        size=(0.1, 3.0),
+        unit="N",
+        signed=True,
+        between_recordings=True,
+        seed=_seed_zero,
+    ),
+)
