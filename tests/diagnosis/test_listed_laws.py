@@ -94,6 +94,7 @@ def test_the_law_of_a_listed_mechanism_is_within_the_band_of_that_mechanism(name
         ("load-cell-scale", "sensor-map", "reading", lambda f: -0.04 * f),
         ("load-cell-offset", "sensor-map", "reading", lambda f: np.full(f.shape, -0.8)),
         ("load-cell-drift", "sensor-map", "time", lambda t: 0.07 * t),
+        ("load-cell-drift", "sensor-map", "time", lambda t: 0.2 * (1 - np.exp(-t / 4))),
         ("load-cell-crosstalk", "sensor-map", "torque", lambda pull: -0.06 * pull),
         ("cable-asymmetry", "sliding-friction", "cable", lambda cable: 1 + 0.1 * cable),
         ("cable-asymmetry", "cable-stretch", "cable", lambda cable: 1 - 0.1 * cable),

@@ -449,6 +449,8 @@ def changed(base, r):
         ("load-cell-scale", {"gain": -0.05}, "F", lambda F, tau, t: 0.95 * F),
         ("load-cell-offset", {"offset": 0.7}, "F", lambda F, tau, t: F + 0.7),
         ("load-cell-drift", {"rate": 0.1}, "F", lambda F, tau, t: F + 0.1 * t),
+        ("load-cell-drift", {"rate": 0.1, "slowing": 1e-12}, "F", lambda F, tau, t: F + 0.1 * t),
+        ("load-cell-drift", {"rate": 0.1, "slowing": 0.5}, "F", lambda F, tau, t: F + 0.2 * (1 - np.exp(-t / 2))),
         ("load-cell-crosstalk", {"crosstalk": 0.08}, "F", lambda F, tau, t: F + 0.08 * tau / R),
     ],
 )

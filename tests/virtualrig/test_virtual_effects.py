@@ -252,6 +252,11 @@ def test_a_gap_and_a_bearing_are_what_their_laws_say(coarse):
         ("torque-scale", "torque_Nm", {"torque_gain": 0.05}),
         ("load-cell-scale", "force_N", {"load_cell_gain": 0.05}),
         ("load-cell-drift", "force_N", {"load_cell_drift_N_per_s": 0.1, "load_cell_warm_up_s": 3.0}),
+        (
+            "load-cell-drift",
+            "force_N",
+            {"load_cell_drift_N_per_s": 0.1, "load_cell_warm_up_s": 3.0, "load_cell_warms_up": "by-root"},
+        ),
     ],
 )
 def test_a_sensor_reads_more_by_the_table_of_its_law(campaign, name, side, faults):
@@ -374,18 +379,29 @@ def test_a_seal_drags_in_one_place(recorded):
     assert not np.allclose(seal.T1_N, drag.T1_N, atol=0.05)
 
 
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("delay_s", [0.001, 0.004, 0.02])
-def test_a_filter_delays_slow_motions_as_a_late_clock_does(campaign, delay_s):
+def test_a_filter_delays_slow_motions_as_a_late_clock_does(campaign, delay_s, order):
     """Delays below and above the 4 ms between two samples."""
     time_s = np.arange(2000) / 250
     truth = Side(np.sin(time_s), np.cos(time_s), 12 + time_s)
     late, filtered = (
         sensed(time_s, truth, campaign.rig, Effects(drive_sensors=fault).drive_sensors)
-        for fault in ({"delay_s": delay_s}, {"filter_s": delay_s})
+        for fault in ({"delay_s": delay_s}, {"filter_s": delay_s, "filter_order": order})
     )
     for there, here in zip(late, filtered, strict=True):
         assert here[100:] == pytest.approx(there[100:], abs=max(2 * delay_s**2, 4e-6))
     assert filtered.torque_Nm[0] == truth.torque_Nm[0]
+
+
+@pytest.mark.parametrize(("order", "gain"), [(1, 0.5**0.5), (2, 0.2**0.5)])
+def test_a_filter_of_higher_order_passes_on_less(campaign, order, gain):
+    """One of first order at the angular frequency 1 / delay; Butterworth's at 2 / delay, twice its corner squared."""
+    time_s, delay_s = np.arange(4000) / 1000, 0.05
+    truth = Side(*[np.sin(order * time_s / delay_s)] * 3)
+    faults = Effects(load_sensors={"filter_s": delay_s, "filter_order": order}).load_sensors
+    settled = sensed(time_s, truth, campaign.rig, faults).torque_Nm[2000:]
+    assert np.ptp(settled) / 2 == pytest.approx(gain, rel=0.01)
 
 
 def test_nothing_turns_the_load_inside_its_gap(recorded):

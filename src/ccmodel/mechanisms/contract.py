@@ -239,6 +239,9 @@ class Mechanism:
         The solver's settings that are no numbers, at their neutral values.
     modifies_physics : callable or None
         ``modifies_physics(settings, values)`` writes the structures.
+    modifies_input : callable or None
+        ``modifies_input(time_s, theta_in, place, values)`` returns the drive's angle as it was, from that which was
+        read, where a mechanism that modifies the observation makes them differ.
     modifies_observation : callable or None
         ``modifies_observation(sensing, place, values)`` returns the channels that change.
     drift : str or None
@@ -263,6 +266,7 @@ class Mechanism:
     settings: Mapping[str, str] = field(default_factory=dict)
     structures: Mapping[str, Any] = field(default_factory=dict)
     modifies_physics: Callable[[Settings, Mapping[str, float]], None] | None = None
+    modifies_input: Callable[[NDArray, NDArray, str, Mapping[str, float]], NDArray] | None = None
     modifies_observation: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
     drift: str | None = None
     states_after_tensioning: Callable[[float, Mapping[str, float]], dict[str, float]] | None = None

@@ -1,12 +1,14 @@
-"""Channels of one end that come late, for the clock of `time_skew` and for learned delays."""
+"""Channels of one end that come late: by a constant time, by one for each sample, or through a filter."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import F_LOAD, TAU_OUT, THETA_OUT
+from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Sensing, side
+from ccmodel.mechanisms.relaxation import lag_weights
 
-_LOAD_CHANNELS = (THETA_OUT, TAU_OUT, F_LOAD)
+_OF_END = {"drive": (THETA_IN, TAU_IN, F_DRIVE), "load": (THETA_OUT, TAU_OUT, F_LOAD)}
 
 
 def late(sensing: Sensing, place: str, delay_s: float | NDArray) -> dict[str, NDArray]:
@@ -23,4 +25,32 @@ def late(sensing: Sensing, place: str, delay_s: float | NDArray) -> dict[str, ND
         rate = (values[-1] - values[-2]) / (t[-1] - t[-2]) if t.size > 1 else 0.0
         return np.interp(read_at, t, values) + rate * beyond_s
 
-    return {name: read(sensing.channels[name]) for name in _LOAD_CHANNELS}
+    return {name: read(sensing.channels[name]) for name in _OF_END["load"]}
+
+
+def through_filter(sensing: Sensing, place: str, time_constant_s: float) -> dict[str, NDArray]:
+    """An end's channels as a low-pass filter of first order passes them on, which has settled at the first sample."""
+    if time_constant_s == 0.0:
+        return {}
+    channels = sensing.channels
+    return {name: _filtered(channels[name], sensing.time_s, time_constant_s) for name in _OF_END[side(place)]}
+
+
+def before_filter(values: NDArray, time_s: NDArray, time_constant_s: float) -> NDArray:
+    """What a filter of first order was given, from what it passed on (n samples): x = y + T dy/dt."""
+    if time_constant_s == 0.0 or values.size < 2:
+        return values
+    return values + time_constant_s * np.gradient(values, time_s)
+
+
+@kernel
+def _filtered(values: NDArray, time_s: NDArray, time_constant_s: float) -> NDArray:
+    """Response of T dy/dt = x - y to x, which is linear between samples, from y = x at the first; shape (n,)."""
+    y = np.empty(values.size)
+    for i in range(values.size):
+        if i == 0:
+            y[i] = values[i]
+            continue
+        keep, before, after = lag_weights((time_s[i] - time_s[i - 1]) / time_constant_s)
+        y[i] = keep * y[i - 1] + before * values[i - 1] + after * values[i]
+    return y

@@ -28,7 +28,7 @@ from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.relaxation import branch_times, kept_at_rest
 from ccmodel.mechanisms.winding import winding
-from ccmodel.model.active import active_of, modify_physics
+from ccmodel.model.active import modify_physics
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
 from ccmodel.model.general.rest import has_drag, held_at_rest
@@ -36,7 +36,7 @@ from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 from ccmodel.model.model_input import PRESCRIBED, ModelInput
 from ccmodel.model.parameters import Parameters
-from ccmodel.model.sensors import read_by_sensors, true_at
+from ccmodel.model.sensors import driven, read_by_sensors, true_at
 from ccmodel.model.session import of_recording
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording
@@ -98,6 +98,7 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     initial = initial_tension(given, parameters, load_from)
     if parameters.drive_encoder_offset:
         given = replace(given, theta_in=given.theta_in + parameters.drive_encoder_offset * given.drive_encoder_offset)
+    given = replace(given, theta_in=driven(parameters.mechanisms, recording.time_s, given.theta_in))
     given, samples = given.with_turning_points
     load, measured = _load(given, parameters, load_from)
     read = _readings(transmission, load, given, samples, initial, parameters)
@@ -136,7 +137,7 @@ def _readings(
         return by_general.complete(samples).read
     response = exact.simulate_pair(transmission, load, given.theta_in, initial).complete(samples)
     radii = transmission.drive_radius_m, transmission.load_radius_m
-    return read_by_sensors(active_of(mechanisms), time_s, response.channels(given.theta_in), radii)
+    return read_by_sensors(mechanisms, time_s, response.channels(given.theta_in), radii)
 
 
 def _motor(given: ModelInput) -> general.Motor:

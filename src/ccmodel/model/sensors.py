@@ -7,10 +7,18 @@ from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
 from ccmodel.mechanisms.contract import Sensing
-from ccmodel.model.active import Active
+from ccmodel.model.active import Active, active_of
 
 # Each iteration reduces the error to the share that the fault is of the reading.
 FAULT_ITERATIONS = 8
+
+
+def driven(active: Sequence[Active], time_s: NDArray, theta_in: NDArray) -> NDArray:
+    """The drive's angle as it was, from that which its sensor read, both rad of shape (n,)."""
+    for a in active_of(active):
+        if (modifies_input := registry.get(a.name).modifies_input) is not None:
+            theta_in = modifies_input(time_s, theta_in, a.place, a.values)
+    return theta_in
 
 
 def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float], radii: tuple[float, float]) -> dict:
@@ -47,7 +55,7 @@ def read_by_sensors(
     if time_s.size == 0:  # a run that ended before its first sample
         return channels
     true = channels
-    for a in active:
+    for a in active_of(active):
         mechanism = registry.get(a.name)
         if mechanism.modifies_observation is not None:
             sensing = Sensing(time_s, channels, *radii, true)

@@ -1,11 +1,15 @@
-"""A late side: its channels read at t what they would have read at t - delay, or through a filter of first order."""
+"""A late side: its channels read at t what they would have read at t - delay, or through a low-pass filter.
+
+The filter is of first order, or of second order with a maximally flat gain (Butterworth, Wireless Engineer 7, 536-541,
+1930). Both delay slow motions by their `filter_s`.
+"""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, lfilter
 
 from virtualrig.effects.contract import Seeded, Side, Twin, group_of
 from virtualrig.strict import NonNegative
@@ -15,25 +19,34 @@ def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: fl
     late = Side(*(np.interp(time_s - faults.delay_s, time_s, values) for values in reading))
     if not faults.filter_s:
         return late
-    # Exact for readings that are linear between samples, so that a ramp is late by the time constant.
-    step_s = time_s[1] - time_s[0]
-    keep = np.exp(-step_s / faults.filter_s)
-    lost = (1 - keep) * faults.filter_s / step_s
-    return Side(*(values[0] + lfilter([1 - lost, lost - keep], [1, -keep], values - values[0]) for values in late))
+    delay = faults.filter_s
+    powers = [delay, 1.0] if faults.filter_order == 1 else [delay**2 / 2, delay, 1.0]
+    # Exact for readings that are linear between samples.
+    (above,), below, _ = cont2discrete(([1.0], powers), time_s[1] - time_s[0], "foh")
+    return Side(*(values[0] + lfilter(above, below, values - values[0]) for values in late))
 
 
-def _filtered(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
-    # To first order in the frequency a filter delays by its time constant.
-    return {group_of(place): {"filter_s": size}}, {"delay": size}
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    # A filter makes a share of the delay in half of the rigs, and in the others none.
+    share = also["filtered"] if also["filtered"] < 1 else 0.0
+    settings = {"delay_s": (1 - share) * size, "filter_s": share * size}
+    return {group_of(place): settings}, {"delay": size, "filtered": share}
+
+
+def _butterworth(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    return {group_of(place): {"filter_s": size, "filter_order": 2}}, {"delay": size}
 
 
 TWIN = Twin(
     name="time-skew",
-    fields={"sensors": {"delay_s": (float, 0.0), "filter_s": (NonNegative, 0.0)}},
+    fields={
+        "sensors": {"delay_s": (float, 0.0), "filter_s": (NonNegative, 0.0), "filter_order": (Literal[1, 2], 1)},
+    },
     places=("drive-sensor", "load-sensor"),
     size=(1e-3, 5e-2),  # a late side only: an early one is the other side's delay
     unit="s",
-    seed=lambda size, also, place, spring: ({group_of(place): {"delay_s": size}}, {"delay": size}),
-    other_laws={"filter": _filtered},
+    also={"filtered": (0.1, 10.0)},
+    seed=_seed,
+    other_laws={"butterworth": _butterworth},
     read=_read,
 )
