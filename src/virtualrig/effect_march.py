@@ -141,10 +141,14 @@ def _deflect(p: Physics, z: NDArray, w: NDArray, dt: float) -> None:
 
 @njit(error_model="numpy")
 def _set_keep(p: Physics, keep: NDArray, drag_rate: NDArray, viscous_rate: NDArray, w: NDArray, dt: float) -> None:
-    """Share of their speed that one cable's nodes keep in a step against a drag with a power of the speed."""
+    """Share of their speed that one cable's nodes keep in a step against a drag that thins with the speed."""
     for i in range(keep.size):
-        speed = max(abs(w[i + 1]), SLOWEST_M_PER_S) / REFERENCE_M_PER_S
-        keep[i] = 1.0 / (1.0 + dt * (drag_rate[i] + viscous_rate[i] * speed ** (p.viscous_power - 1.0)))
+        speed = max(abs(w[i + 1]), SLOWEST_M_PER_S)
+        if p.viscous_eyring > 0.0:
+            thinned = np.arcsinh(speed / p.viscous_eyring) * p.viscous_eyring / speed
+        else:
+            thinned = (speed / REFERENCE_M_PER_S) ** (p.viscous_power - 1.0)
+        keep[i] = 1.0 / (1.0 + dt * (drag_rate[i] + viscous_rate[i] * thinned))
 
 
 @njit(error_model="numpy")
@@ -249,7 +253,7 @@ def march(
     settles = settling.max() > 0.0
     is_slow = slow_friction(p, 1.0, *ANY_STATE) != 1.0
     keep = 1 / (1 + (drag_rate + viscous_rate) * dt)
-    thins = p.viscous_power != 1.0 and viscous_rate.max() > 0.0
+    thins = (p.viscous_power != 1.0 or p.viscous_eyring > 0.0) and viscous_rate.max() > 0.0
     u = np.zeros((2, nodes + 2))
     v = np.zeros((2, nodes + 2))
     tension = start_tension.copy()

@@ -76,6 +76,7 @@ def test_the_law_of_a_listed_mechanism_is_within_the_band_of_that_mechanism(name
     [
         ("stribeck", "sliding-friction", "speed", lambda v: 1 + 0.3 * np.exp(-((10**v / 3e-3) ** 1.4))),
         ("viscous-friction", "sliding-friction", "speed", lambda v: 1 + 6.0 * 10**v),
+        ("viscous-friction", "sliding-friction", "speed", lambda v: 1 + 0.06 * (10**v / 0.01) ** 0.6),
         ("running-in", "sliding-friction", "travel", lambda w: 1 - 0.2 * np.expm1(-w * 8)),
         ("running-in", "sliding-friction", "time", lambda t: 1 - 0.2 * np.expm1(-t / 7)),
         ("relaxation", "sliding-friction", "time", lambda t: 1 - 0.05 * (1 - np.exp(-t / 15))),

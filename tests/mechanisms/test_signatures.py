@@ -10,6 +10,7 @@ from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms.presliding import element_lengths
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.mechanisms.relaxation import BRANCHES, branch_times, followed, kept_at_rest, relaxed_after
+from ccmodel.mechanisms.viscous_friction import power_of_speed
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad
 from ccmodel.model.response import Status
@@ -84,6 +85,30 @@ def test_viscous_friction_widens_loops_with_speed_and_not_with_tension():
     }
     assert extra[5.0, 1.0] > 3.5 * extra[5.0, 4.0] > 0
     assert extra[5.0, 1.0] == pytest.approx(extra[10.0, 1.0], rel=0.15)
+
+
+@pytest.mark.parametrize("power", [0.3, 0.6, 1.0])
+def test_a_viscous_drag_rises_with_its_power_of_the_speed(power):
+    """Loops of triangles, which move at one speed, at four times the speed."""
+    plain = loop_area(run(triangle()))
+    extra = [
+        loop_area(run(triangle(), ("viscous-friction", "conduit", {"c": 40.0, "power": power}), period_s=p)) - plain
+        for p in (1.0, 4.0)
+    ]
+    assert extra[0] / extra[1] == pytest.approx(4**power, rel=0.1)
+
+
+@pytest.mark.parametrize("power", [0.2, 0.7, 1.0])
+def test_the_drag_of_a_power_has_its_slope(power):
+    speed = np.array([-0.03, -1e-3, -2e-5, 0.0, 1e-6, 5e-5, 0.01, 0.2])
+
+    def drag(v):
+        return v * np.array([power_of_speed(float(one), power)[0] for one in v])
+
+    step = 1e-7 * np.maximum(np.abs(speed), 1e-5)
+    slopes = [power_of_speed(float(v), power)[1] for v in speed]
+    assert slopes == pytest.approx((drag(speed + step) - drag(speed - step)) / (2 * step), rel=1e-5)
+    assert drag(np.array([0.01])) == pytest.approx(0.01, rel=1e-5)
 
 
 def test_stribeck_peaks_at_break_away_and_loses_less_at_speed():

@@ -46,6 +46,7 @@ ALONE = {
     "stribeck-hess-soom": {"stribeck": {"law": "hess-soom", "rise": 0.3, "speed_m_per_s": 3e-3}},
     "stribeck-logarithmic": {"stribeck": {"law": "logarithmic", "rise": 0.3, "speed_m_per_s": 3e-3}},
     "viscous-thinning": {"viscous_Ns_per_m2": 200.0, "viscous_power": 0.5},
+    "viscous-eyring": {"viscous_Ns_per_m2": 200.0, "viscous_eyring_m_per_s": 3e-3},
     "load-dependent-logarithmic": {"load_dependent_friction": {"law": "logarithmic", "exponent": -0.3}},
     "seal": {"drag_N": 1.0, "drag_at_share": 0.9},
     "spread-kink": {"kinks": [{"bend_rad": 0.8, "place_share": 0.4, "spread_m": 0.05}]},
@@ -362,6 +363,14 @@ def test_a_drag_of_a_power_below_one_falls_less_at_low_speed(recorded):
     drag = [np.mean((t.T1_N - t.T2_N - ideal.T1_N + ideal.T2_N)[slip]) for t in (linear, thins)]
     speed = 0.006 * np.gradient(ideal.theta_in_rad, ideal.time_s)[slip].mean()
     assert drag[1] / drag[0] == pytest.approx((speed / 0.01) ** -0.5, rel=0.15)
+
+
+def test_eyrings_drag_is_the_linear_one_at_low_speed_and_less_above(recorded):
+    ideal, linear, thins = (recorded(name) for name in ("none", "viscous", "viscous-eyring"))
+    slip = full_slip(ideal)
+    drag = [np.mean((t.T1_N - t.T2_N - ideal.T1_N + ideal.T2_N)[slip]) for t in (linear, thins)]
+    over = 0.006 * np.gradient(ideal.theta_in_rad, ideal.time_s)[slip].mean() / 3e-3
+    assert drag[1] / drag[0] == pytest.approx(np.arcsinh(over) / over, rel=0.15)
 
 
 def test_a_spread_kink_bends_as_much(campaign, recorded):

@@ -22,6 +22,7 @@ from ccmodel.mechanisms.relaxation import BRANCHES, lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
 from ccmodel.mechanisms.tables import interpolated, pulled, slipped
+from ccmodel.mechanisms.viscous_friction import power_of_speed
 from ccmodel.mechanisms.winding import winding, winding_change
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.layout import Physics
@@ -185,6 +186,16 @@ def _set_drag(ph: Physics, piece: NDArray, node: NDArray, grip: NDArray, d: NDAr
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
+def _set_film(ph: Physics, node: NDArray, d: NDArray, c: int, rate: float) -> None:
+    """Viscous drag of each node over its sliding speed, and the derivative of the drag by the speed, N s/m."""
+    viscous, film, slope = node[rows.VISCOUS, c], node[rows.FILM, c], node[rows.FILM_SLOPE, c]
+    for i in range(node.shape[2]):
+        factor, by_speed = power_of_speed(d[i + 1] * rate, ph.viscous_power)
+        film[i] = viscous[i] * factor
+        slope[i] = viscous[i] * by_speed
+
+
+@kernel(error_model="numpy", fastmath=rows.FAST)
 def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float, bristle: float) -> float:
     """Force out of balance at each node and its derivatives; returns the sum of its squares, N^2."""
     n = node.shape[2]
@@ -223,6 +234,8 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
             if ph.drag_table > 0:
                 _set_drag(ph, piece, node, grip, d, c, rate)
                 grip, drags = node[rows.GRIP_NOW, c], node[rows.DRAG_NOW, c]
+            if ph.viscous_power != 1.0:
+                _set_film(ph, node, d, c, rate)
             for i in range(n):
                 xi = node[rows.BRISTLE_NEXT, c, i]
                 x, g, slope = xi + ph.direction_bias * xi * xi, grip[i], node[rows.GRIP_SLOPE, c, i]
@@ -230,9 +243,8 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
                 hold = g * (max(T[i], 0.0) + max(T[i + 1], 0.0)) + drags[i]
                 p[i] = K[i] * (1.0 - x * (g + slope))
                 q[i] = K[i + 1] * (1.0 + x * (g + slope))
-                drag = node[rows.VISCOUS, c, i] * rate
-                fd[i] = fd[i] * hold + drag
-                r[i] = T[i] - T[i + 1] - x * hold - drag * d[i + 1]
+                fd[i] = fd[i] * hold + node[rows.FILM_SLOPE, c, i] * rate
+                r[i] = T[i] - T[i + 1] - x * hold - node[rows.FILM, c, i] * rate * d[i + 1]
             if ph.drag_table > 0:
                 for i in range(n):
                     xi = node[rows.BRISTLE_NEXT, c, i]

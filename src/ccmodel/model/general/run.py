@@ -332,7 +332,8 @@ def _constants(
     if settings.added_drag is not None:
         node[rows.DRAG][:, cells] += settings.added_drag.at(grid.middle_m / length) * cell
     drag = settings.conduit_drag
-    node[rows.VISCOUS][:, cells] = settings.viscous * cell
+    for film in (rows.VISCOUS, rows.FILM, rows.FILM_SLOPE):
+        node[film][:, cells] = settings.viscous * cell
     if drive is not None:
         piece[rows.STIFFNESS][:, 0] = 1 / drive[0]
     if load is not None:
