@@ -66,8 +66,9 @@ def test_slow_and_fast_friction_are_told_apart_by_speed():
     recordings = batch()
     numbers = {"friction_torque": 2e-3, "presliding": 2e-3, "share": 0.0}
     bearing = {f"pulley-friction/drive-pulley/{name}": value for name, value in numbers.items()}
+    viscous = {"viscous-friction/conduit/c": 30.0, "viscous-friction/conduit/power": 1.0}
     rivals = [
-        fitted(recordings, ("viscous-friction", "conduit"), **{"viscous-friction/conduit/c": 30.0}),
+        fitted(recordings, ("viscous-friction", "conduit"), **viscous),
         fitted(recordings, ("pulley-friction", "drive-pulley"), **bearing),
     ]
     found = proposed(judged(recordings, *rivals), PARAMETERS)
