@@ -98,6 +98,16 @@ def test_a_viscous_drag_rises_with_its_power_of_the_speed(power):
     assert extra[0] / extra[1] == pytest.approx(4**power, rel=0.1)
 
 
+@pytest.mark.parametrize("power", [0.5, 1.0])
+def test_a_viscous_drag_is_of_second_order_in_the_time_step(power):
+    """Half a step's delay of the speed would be a drag in proportion to acceleration, as of a mass."""
+    mechanism = ("viscous-friction", "conduit", {"c": 100.0, "power": power})
+    coarse, fine, finest = (
+        run(sine(samples=n), mechanism, samples=n).tau_in_Nm[:: n // 500] for n in (500, 1000, 4000)
+    )
+    assert rms(coarse, finest) > 2.5 * rms(fine, finest)
+
+
 @pytest.mark.parametrize("power", [0.2, 0.7, 1.0])
 def test_the_drag_of_a_power_has_its_slope(power):
     speed = np.array([-0.03, -1e-3, -2e-5, 0.0, 1e-6, 5e-5, 0.01, 0.2])

@@ -158,7 +158,33 @@ def _elements(ph: Physics, node: NDArray, d: NDArray, c: int, length: float) -> 
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def _set_drag(ph: Physics, piece: NDArray, node: NDArray, grip: NDArray, d: NDArray, c: int, rate: float) -> None:
+def _set_speeds(node: NDArray, slide: NDArray, c: int, dt: float, last_dt: float) -> None:
+    """Sliding speed of each node at the end of a step of dt (s), and its derivative by the slide.
+
+    Mean speeds of this step and of the last one are extrapolated, to second order in the time step. Where the node has
+    just begun to slide the last one says less, and from rest nothing; where it all but stops, it does not turn.
+    """
+    d, last = slide[rows.NOW, c], slide[rows.LAST, c]
+    speed, by_slide = node[rows.SPEED, c], node[rows.SPEED_BY_SLIDE, c]
+    rate, last_rate = 1.0 / dt, 1.0 / last_dt if last_dt > 0.0 else 0.0
+    share = dt / (dt + last_dt) if last_dt > 0.0 else 0.0
+    for i in range(node.shape[2]):
+        mean = abs(d[i + 1]) * rate
+        before = (last[i + 1] if d[i + 1] >= 0.0 else -last[i + 1]) * last_rate
+        if before < mean:
+            begun = max(2.0 * before, 0.0)
+            slower = mean - before <= begun
+            change, slope = (mean - before, 1.0) if slower else (begun, 0.0)
+        else:
+            stops = before - mean >= mean
+            change, slope = (-mean, -1.0) if stops else (mean - before, 1.0)
+        end = mean + share * change
+        speed[i] = end if d[i + 1] >= 0.0 else -end
+        by_slide[i] = rate * (1.0 + share * slope)
+
+
+@kernel(error_model="numpy", fastmath=rows.FAST)
+def _set_drag(ph: Physics, piece: NDArray, node: NDArray, grip: NDArray, c: int) -> None:
     """Add a drag by speed to the friction of each node, of which `grip` is the part in proportion to its tensions.
 
     Nothing would hold a slack cable whose drag falls with speed. Towards no tension, the drag changes over to the table
@@ -166,13 +192,14 @@ def _set_drag(ph: Physics, piece: NDArray, node: NDArray, grip: NDArray, d: NDAr
 
     `DRAG_SLOPE` is the derivative of friction by the slide over the node's direction, N/m.
     """
-    T, drag = piece[rows.TENSION, c], node[rows.DRAG, c]
+    T, drag, speeds = piece[rows.TENSION, c], node[rows.DRAG, c], node[rows.SPEED, c]
     in_proportion, constant, slope = node[rows.GRIP_NOW, c], node[rows.DRAG_NOW, c], node[rows.DRAG_SLOPE, c]
     of_slack = ph.drag_table + 1 + 2 * int(node[ph.drag_table, 0, 0])
     for i in range(node.shape[2]):
         both = max(T[i], 0.0) + max(T[i + 1], 0.0)
         share = min(both / (2.0 * SLACK_N), 1.0)
-        speed, rise = abs(d[i + 1]) * rate, rate if d[i + 1] >= 0.0 else -rate
+        speed, by_slide = abs(speeds[i]), node[rows.SPEED_BY_SLIDE, c, i]
+        rise = by_slide if speeds[i] >= 0.0 else -by_slide
         taut, by_speed = interpolated(node, ph.drag_table, c, i, speed)
         least = -grip[i] * max(both, 2.0 * SLACK_N)
         if taut < least:
@@ -186,21 +213,22 @@ def _set_drag(ph: Physics, piece: NDArray, node: NDArray, grip: NDArray, d: NDAr
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def _set_film(ph: Physics, node: NDArray, d: NDArray, c: int, rate: float) -> None:
+def _set_film(ph: Physics, node: NDArray, c: int) -> None:
     """Viscous drag of each node over its sliding speed, and the derivative of the drag by the speed, N s/m."""
     viscous, film, slope = node[rows.VISCOUS, c], node[rows.FILM, c], node[rows.FILM_SLOPE, c]
     for i in range(node.shape[2]):
-        factor, by_speed = power_of_speed(d[i + 1] * rate, ph.viscous_power)
+        factor, by_speed = power_of_speed(node[rows.SPEED, c, i], ph.viscous_power)
         film[i] = viscous[i] * factor
         slope[i] = viscous[i] * by_speed
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float, bristle: float) -> float:
+def _nodes(
+    ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float, last_dt: float, bristle: float
+) -> float:
     """Force out of balance at each node and its derivatives; returns the sum of its squares, N^2."""
     n = node.shape[2]
     total = 0.0
-    rate = 1.0 / dt if dt > 0.0 else 0.0
     for c in range(2):
         T, K, d = piece[rows.TENSION, c], piece[rows.TANGENT, c], slide[rows.NOW, c]
         grip, before = node[rows.GRIP, c], node[rows.BRISTLE, c]
@@ -231,11 +259,13 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
                 _set_hold(ph, piece, node, c)
                 grip = node[rows.GRIP_NOW, c]
             drags = node[rows.DRAG, c]
+            if dt > 0.0 and (ph.drag_table > 0 or ph.viscous != 0.0):
+                _set_speeds(node, slide, c, dt, last_dt)
             if ph.drag_table > 0:
-                _set_drag(ph, piece, node, grip, d, c, rate)
+                _set_drag(ph, piece, node, grip, c)
                 grip, drags = node[rows.GRIP_NOW, c], node[rows.DRAG_NOW, c]
             if ph.viscous_power != 1.0:
-                _set_film(ph, node, d, c, rate)
+                _set_film(ph, node, c)
             for i in range(n):
                 xi = node[rows.BRISTLE_NEXT, c, i]
                 x, g, slope = xi + ph.direction_bias * xi * xi, grip[i], node[rows.GRIP_SLOPE, c, i]
@@ -243,8 +273,8 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
                 hold = g * (max(T[i], 0.0) + max(T[i + 1], 0.0)) + drags[i]
                 p[i] = K[i] * (1.0 - x * (g + slope))
                 q[i] = K[i + 1] * (1.0 + x * (g + slope))
-                fd[i] = fd[i] * hold + node[rows.FILM_SLOPE, c, i] * rate
-                r[i] = T[i] - T[i + 1] - x * hold - node[rows.FILM, c, i] * rate * d[i + 1]
+                fd[i] = fd[i] * hold + node[rows.FILM_SLOPE, c, i] * node[rows.SPEED_BY_SLIDE, c, i]
+                r[i] = T[i] - T[i + 1] - x * hold - node[rows.FILM, c, i] * node[rows.SPEED, c, i]
             if ph.drag_table > 0:
                 for i in range(n):
                     xi = node[rows.BRISTLE_NEXT, c, i]
@@ -366,7 +396,7 @@ def imbalance(
     pulled = ph.load_pulley.radius_m * winding_change(load[rows.ANGLE], rotation, ph.load_pulley)
     slide[rows.NOW, 0, n + 1], slide[rows.NOW, 1, n + 1] = pulled, -pulled
     _tensions(ph, piece, slide, mean, follows)
-    error = _nodes(ph, piece, node, slide, dt, bristle)
+    error = _nodes(ph, piece, node, slide, dt, load[rows.DT], bristle)
     G, slope, R = _load(ph, piece, load, rotation, torque, dt)
     if ph.kind == rows.IMPEDANCE:
         error += (G / ph.load_pulley.radius_m) ** 2

@@ -45,11 +45,13 @@ BRANCH = 10
     GRIP_SLOPE,
     DRAG_NOW,
     DRAG_SLOPE,
+    SPEED,
+    SPEED_BY_SLIDE,
     FILM,
     FILM_SLOPE,
-) = range(22)
+) = range(24)
 # Then the elements of presliding friction and its creeping one, -1 to 1: state, and result of the step.
-ELEMENT, ELEMENT_NEXT = 22, 23 + MOST_ELEMENTS
+ELEMENT, ELEMENT_NEXT = 24, 25 + MOST_ELEMENTS
 # slide, shape (rows, 2, n + 2): drive end, nodes, load end, m. Of this step, of Newton's step, and of those before.
 NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # mean, shape (rows, 2): mean tension of a cable, which a compliant conduit responds to, N.
@@ -88,7 +90,7 @@ LAST_ROTATION, ROTATION_BEFORE, LAST_PULL, PULL_BEFORE, LAST_DT = range(5)
 PAST_ROWS = 5
 # drive pulley, shape (3,): angle, middle of the range that its encoder leaves open (rad); bristle of its bearing.
 DRIVE_ANGLE, DRIVE_MIDDLE, DRIVE_BEARING = range(3)
-PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 24 + 2 * MOST_ELEMENTS, 5, 11, 12
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 26 + 2 * MOST_ELEMENTS, 5, 11, 12
 # Then, in a run that has them, tables (`ccmodel.mechanisms.tables`) of compliance and of friction, each by tension; and
 # one of drag by speed, from the row `drag_table` of the run's constants. The load may have the tables of `LOAD_LAWS`,
 # each from the row of its name in the run's constants.
