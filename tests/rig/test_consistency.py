@@ -34,6 +34,7 @@ from ccmodel.rig.sensor_checks import held_for
 from proof.build import record
 from proof.cases import draw
 from single_cable_batches import write_batch
+from virtualrig.effects import Effects
 
 SIMULATED, OTHER = Path("data/raw/pretension"), Path("tests/data/ideal-rig/loops")
 SIGNS = {"angles": 1.0, "torques": 0.5, "work": 0.9, "load": 1.0, "loss": 0.9, "F_drive": 1.0, "F_load": 1.0}
@@ -731,11 +732,10 @@ def test_degrees_in_the_place_of_rad_are_called_so(tmp_path):
 
 def test_a_load_cell_that_errs_in_all_recordings_makes_none_of_them_foreign(tmp_path):
     """Its offset of 2.2 N and its drift double the friction that one recording seems to have."""
-    case = draw(25007)
-    assert [(t.name, t.place) for t in case.truth] == [
-        ("load-cell-drift", "load-sensor"),
-        ("load-cell-offset", "load-sensor"),
-    ]
+    drawn = draw(25007)
+    faults = {"load_cell_offset_N": 2.224, "load_cell_drift_N_per_s": 0.138, "load_cell_warm_up_s": 4.98}
+    rig = drawn.campaign.rig.model_copy(update={"effects": Effects(load_sensors=faults)})
+    case = replace(drawn, campaign=drawn.campaign.model_copy(update={"rig": rig}))
     record(case, case.recordings, tmp_path / case.name)
     assert said_of(tmp_path / case.name) == []
 
