@@ -14,7 +14,7 @@ side; a filter also takes off amplitude.
 
 Source: Mills, Internet time synchronization: the network time protocol, IEEE Transactions on Communications 39(10),
 1482-1493, 1991, doi:10.1109/26.103043, on clock offset; Franklin, Powell and Emami-Naeini, Feedback Control of Dynamic
-Systems, 8th edition, Pearson, 2019, Section 3.3, on the filter of first order.
+Systems, 8th edition, Pearson, 2019, on the filter of first order.
 """
 
 from collections.abc import Mapping
