@@ -122,6 +122,13 @@ class Parameter:
         return float(self.low + share * (self.high - self.low))
 
 
+def optional_share(name: str, meaning: str) -> Parameter:
+    """A share, 0 to 1, that a rig with the mechanism may as well have as zero; screening takes none and all of it."""
+    return Parameter(
+        name, "1", 0.0, 1.0, 0.0, meaning, scale="linear", screening_grid=(0.0, 1.0), default=0.0, optional=True
+    )
+
+
 @dataclass(frozen=True)
 class Curve:
     """A mechanism as a law of one quantity at one slot, to which a learned law is compared.

@@ -46,11 +46,8 @@ def before_filter(values: NDArray, time_s: NDArray, time_constant_s: float) -> N
 @kernel
 def _filtered(values: NDArray, time_s: NDArray, time_constant_s: float) -> NDArray:
     """Response of T dy/dt = x - y to x, which is linear between samples, from y = x at the first; shape (n,)."""
-    y = np.empty(values.size)
-    for i in range(values.size):
-        if i == 0:
-            y[i] = values[i]
-            continue
+    y = values.copy()
+    for i in range(1, values.size):
         keep, before, after = lag_weights((time_s[i] - time_s[i - 1]) / time_constant_s)
         y[i] = keep * y[i - 1] + before * values[i - 1] + after * values[i]
     return y

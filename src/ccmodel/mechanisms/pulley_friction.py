@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import BEARING_TORQUE, LOAD, Curve, Mechanism, Parameter
+from ccmodel.mechanisms.contract import BEARING_TORQUE, LOAD, Curve, Mechanism, Parameter, optional_share
 from ccmodel.mechanisms.load_dependent_friction import REFERENCE_N
 from ccmodel.mechanisms.presliding import dahl
 
@@ -94,18 +94,7 @@ MECHANISM = Mechanism(
             default=PRESLIDING_RAD,
             above=0.0,
         ),
-        Parameter(
-            "share",
-            "1",
-            0.0,
-            1.0,
-            0.0,
-            "share of the torque that is in proportion to the cables' pull",
-            scale="linear",
-            screening_grid=(0.0, 1.0),
-            default=0.0,
-            optional=True,
-        ),
+        optional_share("share", "share of the torque that is in proportion to the cables' pull"),
     ),
     mistaken_for=("torque-scale", "constant-drag"),
     depends_on_time=False,

@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.mechanisms.contract import SENSOR_MAP, Curve, Mechanism, Parameter, Sensing, side
+from ccmodel.mechanisms.contract import SENSOR_MAP, Curve, Mechanism, Parameter, Sensing, optional_share, side
 from ccmodel.mechanisms.delayed import before_filter, late, through_filter
 
 
@@ -50,18 +50,7 @@ MECHANISM = Mechanism(
     places=("drive-sensor", "load-sensor"),
     parameters=(
         _DELAY,
-        Parameter(
-            "filtered",
-            "1",
-            0.0,
-            1.0,
-            0.0,
-            "share of the delay that a low-pass filter of first order makes",
-            scale="linear",
-            screening_grid=(0.0, 1.0),
-            default=0.0,
-            optional=True,
-        ),
+        optional_share("filtered", "share of the delay that a low-pass filter of first order makes"),
     ),
     mistaken_for=("viscous-friction", "load-inertia"),
     depends_on_time=True,
