@@ -3,12 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.channels import ANGLE_AT, SUM_AT, TORQUE_AT
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Sensing, side
 from ccmodel.mechanisms.relaxation import lag_weights
-
-_OF_END = {"drive": (THETA_IN, TAU_IN, F_DRIVE), "load": (THETA_OUT, TAU_OUT, F_LOAD)}
 
 
 def late(sensing: Sensing, place: str, delay_s: float | NDArray) -> dict[str, NDArray]:
@@ -25,7 +23,7 @@ def late(sensing: Sensing, place: str, delay_s: float | NDArray) -> dict[str, ND
         rate = (values[-1] - values[-2]) / (t[-1] - t[-2]) if t.size > 1 else 0.0
         return np.interp(read_at, t, values) + rate * beyond_s
 
-    return {name: read(sensing.channels[name]) for name in _OF_END["load"]}
+    return {name: read(sensing.channels[name]) for name in _channels_of("load")}
 
 
 def through_filter(sensing: Sensing, place: str, time_constant_s: float) -> dict[str, NDArray]:
@@ -33,7 +31,7 @@ def through_filter(sensing: Sensing, place: str, time_constant_s: float) -> dict
     if time_constant_s == 0.0:
         return {}
     channels = sensing.channels
-    return {name: _filtered(channels[name], sensing.time_s, time_constant_s) for name in _OF_END[side(place)]}
+    return {name: _filtered(channels[name], sensing.time_s, time_constant_s) for name in _channels_of(side(place))}
 
 
 def before_filter(values: NDArray, time_s: NDArray, time_constant_s: float) -> NDArray:
@@ -41,6 +39,11 @@ def before_filter(values: NDArray, time_s: NDArray, time_constant_s: float) -> N
     if time_constant_s == 0.0 or values.size < 2:
         return values
     return values + time_constant_s * np.gradient(values, time_s)
+
+
+def _channels_of(end: str) -> tuple[str, ...]:
+    """What the sensors of the drive's or the load's end read."""
+    return ANGLE_AT[end], TORQUE_AT[end], SUM_AT[end]
 
 
 @kernel

@@ -14,8 +14,11 @@ FAULT_ITERATIONS = 8
 
 
 def driven(active: Sequence[Active], time_s: NDArray, theta_in: NDArray) -> NDArray:
-    """The drive's angle as it was, from that which its sensor read, both rad of shape (n,)."""
-    for a in active_of(active):
+    """The drive's angle as it was, from that which its sensor read, both rad of shape (n,).
+
+    Every parameter of `active` has a value.
+    """
+    for a in active:
         if (modifies_input := registry.get(a.name).modifies_input) is not None:
             theta_in = modifies_input(time_s, theta_in, a.place, a.values)
     return theta_in
@@ -39,11 +42,11 @@ def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float],
     dict of str to float
         The same channels, by fixed-point iteration.
     """
-    faults = [a for a in active if registry.get(a.name).modifies_observation is not None]
+    faults = [a for a in active_of(active) if registry.get(a.name).modifies_observation is not None]
     true = dict(read)
     for _ in range(FAULT_ITERATIONS if faults else 0):
         steady = {c: np.full(2, value) for c, value in true.items()}
-        faulty = read_by_sensors(faults, np.array([0.0, seconds]), steady, radii)
+        faulty = _read(faults, np.array([0.0, seconds]), steady, radii)
         true = {c: true[c] + read[c] - float(faulty[c][1]) for c in true}
     return true
 
@@ -54,8 +57,15 @@ def read_by_sensors(
     """Readings of the sensors (n samples a channel) from true values, with the faults that act on them."""
     if time_s.size == 0:  # a run that ended before its first sample
         return channels
+    return _read(active_of(active), time_s, channels, radii)
+
+
+def _read(
+    active: Sequence[Active], time_s: NDArray, channels: dict[str, NDArray], radii: tuple[float, float]
+) -> dict[str, NDArray]:
+    """The same, where every parameter has a value."""
     true = channels
-    for a in active_of(active):
+    for a in active:
         mechanism = registry.get(a.name)
         if mechanism.modifies_observation is not None:
             sensing = Sensing(time_s, channels, *radii, true)
