@@ -5,9 +5,9 @@
 2. Its docstring (a relative's: that of its function) is its ``text``: a title and the paragraphs of `PARAGRAPHS`. The
    command line, ``docs/mechanisms`` and the report are made from it and from the fields.
 3. A mechanism modifies either the physics or the observation, or is the drift of a parameter of the model, or of
-   another mechanism, from recording to recording (`ccmodel.model.session`). Before a run, its parameters are written into the
-   solver's `Settings` as ``settings`` declares; a setting that is no number stands in ``structures`` and is written by
-   ``modifies_physics``. After a run, ``modifies_observation`` changes what the sensors read.
+   another mechanism, from recording to recording (`ccmodel.model.session`). Before a run, its parameters are written
+   into the solver's `Settings` as ``settings`` declares; a setting that is no number stands in ``structures`` and is
+   written by ``modifies_physics``. After a run, ``modifies_observation`` changes what the sensors read.
 4. A model without the mechanism and a model with it at its neutral values give the same numbers, bit for bit. Where
    the equation excludes its neutral value (a bristle length of zero), the tests of the registry state how close to the
    paper's model it comes near that value.
