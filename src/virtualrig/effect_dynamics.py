@@ -111,13 +111,19 @@ def _bristle_lengths(effects: Effects, numerics: Numerics) -> NDArray:
 
 
 def _drag_shares(effects: Effects, grid: Grid) -> NDArray:
-    """Share of the constant drag in each cell: by length, or all of it in one, shape (n,)."""
+    """Share of the constant drag in each cell, shape (n,): by length, or that of one or two seals.
+
+    A seal is shared between the two nodes around its place, so that its mean place is exact on any grid.
+    """
     ends = np.cumsum(grid.cell_length_m)
     if effects.drag_at_share is None:
         return grid.cell_length_m / ends[-1]
-    shares = np.zeros(ends.size)
-    shares[np.searchsorted(ends, effects.drag_at_share * ends[-1])] = 1.0
-    return shares
+    centre = (ends - grid.cell_length_m / 2) / ends[-1]
+    of_cell = np.eye(centre.size)
+    near, far = (
+        [np.interp(at, centre, one) for one in of_cell] for at in (effects.drag_at_share, effects.drag_far_share)
+    )
+    return (1.0 - effects.drag_far_part) * np.array(near) + effects.drag_far_part * np.array(far)
 
 
 def _half_bend(grid: Grid, effects: Effects, friction_coefficient: float) -> NDArray:

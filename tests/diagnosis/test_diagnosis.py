@@ -331,10 +331,10 @@ def test_a_motion_without_its_columns_is_refused(clean, tmp_path):
 
 
 def test_a_number_stands_where_a_finer_solver_would_have_it():
-    key, found = "constant-drag/conduit/f0", {}
+    key, found = "load-cell-offset/load-sensor/offset", {}
     for moved in (0.0, 0.03):
         candidate = CandidateFit(
-            Hypothesis((("constant-drag", "conduit"),)),
+            Hypothesis((("load-cell-offset", "load-sensor"),)),
             [],
             {},
             {key: 0.5},

@@ -159,7 +159,7 @@ def test_recordings_are_asked_for_until_one_rival_leads():
 def test_a_difference_that_a_refit_takes_up_tells_nothing_separation(known_to, apart):
     """Two rivals that are one, but for a stiffness that the recordings do not tell."""
     recordings = batch()
-    drag = {"constant-drag/conduit/f0": 0.5}
+    drag = {"constant-drag/conduit/f0": 0.5, "constant-drag/conduit/local": 0.0, "constant-drag/conduit/s": 0.5}
     rivals = [
         fitted(recordings, ("constant-drag", "conduit"), known_to=known_to, **drag | {"stiffness_N_per_m": k})
         for k in (8500.0, 9500.0)

@@ -1,12 +1,14 @@
 """The signature of each mechanism in a run of the general solver."""
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
+from ccmodel.mechanisms.constant_drag import drag_shares
 from ccmodel.mechanisms.presliding import element_lengths
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.mechanisms.relaxation import BRANCHES, branch_times, followed, kept_at_rest, relaxed_after
@@ -14,7 +16,7 @@ from ccmodel.mechanisms.viscous_friction import power_of_speed
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad
 from ccmodel.model.response import Status
-from general_runs import HALF_LOOP, K_E, MU, T0, TENSIONS, L, R, last_cycle, loop_area, rms, run, sine
+from general_runs import HALF_LOOP, K_E, MU, T0, TENSIONS, K, L, R, last_cycle, loop_area, rms, run, sine
 
 DRIVE_ONLY = (*TENSIONS, "theta_out_rad", "tau_out_Nm")
 
@@ -197,6 +199,42 @@ def test_constant_drag_remains_at_zero_tension():
     theta = np.linspace(0, 0.6, 200)
     r = run(theta, ("constant-drag", "conduit", {"f0": f0}), T=0.02, mu=1e-6)
     assert r.T1_N[-1] - r.T2_N[-1] == pytest.approx(f0, rel=1e-3)
+
+
+def test_a_seal_stalls_the_front_at_its_place_and_a_drag_all_along_does_not():
+    f0 = 0.8
+    theta = np.linspace(0, 0.6, 1200)
+    plain = run(theta, mu=1e-6)
+    seal, spread = (
+        run(theta, ("constant-drag", "conduit", {"f0": f0, "local": local, "s": 0.25}), mu=1e-6) for local in (1.0, 0.0)
+    )
+    for r in (seal, spread):
+        assert r.T1_N[-1] - r.T2_N[-1] == pytest.approx(f0, rel=1e-4)
+    # Until the drive pulls with f0 only the cable between drive and seal stretches: a quarter of it.
+    held = (seal.T1_N - seal.T1_N[0])[1:] < 0.9 * f0
+    stiffness = np.diff(seal.T1_N)[held] / (R * np.diff(theta)[held])
+    assert stiffness == pytest.approx(K / 0.25, rel=0.03)
+    assert np.diff(seal.T1_N)[-1] == pytest.approx(np.diff(plain.T1_N)[-1], rel=1e-3)
+
+
+def test_a_seal_at_the_drive_is_like_the_friction_of_its_bearing():
+    theta = np.linspace(0, 0.6, 400)
+    seal = run(theta, ("constant-drag", "conduit", {"f0": 0.4, "local": 1.0, "s": 0.0}))
+    bearing = run(theta, ("pulley-friction", "drive-pulley", {"friction_torque": 0.8 * R, "presliding": 1e-5}))
+    assert seal.theta_out_rad[-1] == pytest.approx(bearing.theta_out_rad[-1], rel=5e-3)
+    assert seal.tau_in_Nm[-1] == pytest.approx(bearing.tau_in_Nm[-1], rel=5e-3)
+
+
+@pytest.mark.parametrize("s", [0.0, 0.03, 0.31, 0.5, 1.0])
+def test_the_drag_of_a_seal_is_divided_so_that_its_mean_place_is_stated(s):
+    cell = np.array([0.5, 1.0, 1.0, 2.0, 0.5])
+    middle = (np.cumsum(cell) - cell / 2) / cell.sum()
+    seal, spread = (drag_shares(SimpleNamespace(drag_local=local, drag_place=s), cell) for local in (1.0, 0.0))
+    assert seal.sum() == pytest.approx(1.0)
+    assert seal @ middle == pytest.approx(np.clip(s, middle[0], middle[-1]))
+    assert np.count_nonzero(seal) <= 2
+    assert spread == pytest.approx(cell / cell.sum())
+    assert drag_shares(SimpleNamespace(drag_local=1.0, drag_place=s), cell[:1]) == pytest.approx([1.0])
 
 
 def test_kink_adds_its_bend_to_the_loss_and_stalls_the_front():

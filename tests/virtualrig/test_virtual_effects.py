@@ -49,6 +49,7 @@ ALONE = {
     "viscous-eyring": {"viscous_Ns_per_m2": 200.0, "viscous_eyring_m_per_s": 3e-3},
     "load-dependent-logarithmic": {"load_dependent_friction": {"law": "logarithmic", "exponent": -0.3}},
     "seal": {"drag_N": 1.0, "drag_at_share": 0.9},
+    "two-seals": {"drag_N": 1.0, "drag_at_share": 0.1, "drag_far_share": 0.9, "drag_far_part": 0.4},
     "spread-kink": {"kinks": [{"bend_rad": 0.8, "place_share": 0.4, "spread_m": 0.05}]},
     "hyperbolic-running-in": {"running_in": {"law": "hyperbolic", "change": 0.3, "scale": 0.5}},
     "settling-exponential": {"strand_settling": {"law": "exponential", "tension_scale_N": 3.0}},
@@ -386,6 +387,14 @@ def test_a_seal_drags_in_one_place(recorded):
     over = [np.mean((t.T1_N - ideal.T1_N - (t.T2_N - ideal.T2_N))[slip]) for t in (seal, drag)]
     assert over[0] == pytest.approx(over[1], rel=0.4)
     assert not np.allclose(seal.T1_N, drag.T1_N, atol=0.05)
+
+
+def test_two_seals_drag_as_much_as_a_cable_all_along(recorded):
+    seals, drag, ideal = (recorded(name) for name in ("two-seals", "drag", "none"))
+    slip = full_slip(ideal)
+    over = [np.mean((t.T1_N - ideal.T1_N - (t.T2_N - ideal.T2_N))[slip]) for t in (seals, drag)]
+    assert over[0] == pytest.approx(over[1], rel=0.1)
+    assert not np.allclose(seals.T1_N, drag.T1_N, atol=0.01)
 
 
 @pytest.mark.parametrize("order", [1, 2])

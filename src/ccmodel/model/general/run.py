@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TAU_IN, TAU_OUT, TENSIONS, THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
+from ccmodel.mechanisms.constant_drag import drag_shares
 from ccmodel.mechanisms.contract import Sensing, Settings
 from ccmodel.mechanisms.learned import end_spring
 from ccmodel.mechanisms.load_inertia import load_damping
@@ -328,7 +329,7 @@ def _constants(
     piece[rows.RELAXING][:, segments] = settings.relaxing_share
     piece[rows.SHARE][:, segments] = segment / length
     node[rows.HALF_BEND][:, cells] = friction * ratio_mu * (grid.cell_rad + added_rad) / 2
-    node[rows.DRAG][:, cells] = settings.drag_N * cell / length
+    node[rows.DRAG][:, cells] = settings.drag_N * drag_shares(settings, cell)
     if settings.added_drag is not None:
         node[rows.DRAG][:, cells] += settings.added_drag.at(grid.middle_m / length) * cell
     drag = settings.conduit_drag
