@@ -77,6 +77,7 @@ def judged(seed: int, kind: str, out: Path) -> dict:
             "failure": found.failure,
             "named": [m["name"] for m in found.identified],
             "all_named": found.are_all_identified,
+            "all_accounted_for": found.are_all_accounted_for,
             "not_there": [m["name"] for m in found.identified if not found.true_among([m])],
             "all_listed": found.true_names <= found.true_among([*found.identified, *found.listed]),
             "confidence": [m["confidence"] for m in found.identified],
@@ -91,15 +92,18 @@ def judged(seed: int, kind: str, out: Path) -> dict:
 
 
 def rates(rows: list[dict], size: int) -> list[dict]:
-    """How often all effects are named, listed, one that is not there named, and more named than there are.
+    """How often all effects are named, named or learned, listed; one that is not there named, or more than there are.
 
     An effect counts at its place.
     """
-    all_named, all_listed = ([r[key] for r in rows] for key in ("all_named", "all_listed"))
+    all_named, all_accounted_for, all_listed = (
+        [r[key] for r in rows] for key in ("all_named", "all_accounted_for", "all_listed")
+    )
     wrong = [bool(r["not_there"]) for r in rows]
     too_many = [len(r["named"]) > size for r in rows]
     return [
         rate("all effects named", sum(all_named), len(rows)),
+        rate("all effects named, or a law learned in the slot of one", sum(all_accounted_for), len(rows)),
         rate("all effects named or among the alternatives", sum(all_listed), len(rows)),
         rate("an effect named that is not there", sum(wrong), len(rows)),
         rate("more effects named than there are", sum(too_many), len(rows)),

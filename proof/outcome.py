@@ -122,6 +122,17 @@ class Outcome:
         return self.true_names <= self.true_among(self.identified)
 
     @property
+    def are_all_accounted_for(self) -> bool:
+        """Whether each concealed effect is identified at its place, or a learned verdict has a law of it.
+
+        The mechanisms beside a learned law count as identified.
+        """
+        if self.verdict != "learned":
+            return self.are_all_identified
+        named = self.true_among(self.diagnosis["mechanisms"])
+        return all(t["name"] in named or any(is_law_of(law, t) for law in self.laws) for t in self.key["truth"])
+
+    @property
     def laws(self) -> list[dict]:
         """Learned laws of the diagnosis."""
         return (self.diagnosis or {}).get("laws") or []

@@ -88,6 +88,21 @@ def test_a_pair_that_is_declared_complete_with_one_member_is_confidently_wrong()
     assert not Outcome(answered, both).is_confidently_wrong
 
 
+def test_a_pair_is_accounted_for_if_one_is_named_and_the_law_of_the_other_is_learned():
+    answered = answer("pair", GAIN, ("kink", "conduit", 0.5, {}))
+    both = reported("explained", ("torque-scale", "drive-sensor", 0.9, VALUE), ("kink", "conduit", 0.9, []))
+    assert Outcome(answered, both).are_all_accounted_for
+    assert not Outcome(answered, RIGHT).are_all_accounted_for
+    for place, is_its in (("conduit", True), ("load", False)):
+        beside = RIGHT | {
+            "verdict": "learned",
+            "laws": [{"place": place, "slot": "sliding-friction", "confidence": 0.9}],
+        }
+        assert Outcome(answered, beside).are_all_accounted_for == is_its
+        assert not Outcome(answered, beside).are_all_identified
+        assert not Outcome(answered, beside | {"mechanisms": []}).are_all_accounted_for
+
+
 @pytest.mark.parametrize(
     ("name", "confidence", "wrong"), [("kink", 0.9, True), ("kink", 0.7, False), ("torque-scale", 0.9, False)]
 )
