@@ -13,7 +13,7 @@ from ccmodel.diagnosis import selection as selections
 from ccmodel.diagnosis.candidate import LAST_SEARCH, VALUES_STAY, CandidateFit
 from ccmodel.diagnosis.comparison import Comparison, imitation, log_priors, priors_of_further
 from ccmodel.diagnosis.discrepancy import Evidence
-from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.hypothesis import PAPER, Hypothesis
 from ccmodel.diagnosis.laws import Proposal
 from ccmodel.diagnosis.repeatability import FrictionPValues
 from ccmodel.diagnosis.result import alternatives_of
@@ -1109,6 +1109,28 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
     assert late_selection.relinearise(tried).laws_beside == {base.hypothesis}
 
 
+@pytest.mark.parametrize(
+    "behind, best",
+    [(0.0, "pair"), (2.5, "pair"), (3.5, "single")],
+    ids=["as much evidence", "less evidence", "far less evidence"],
+)
+def test_the_best_predictor_errs_least_of_what_evidence_hardly_tells_apart(behind, best):
+    single, pair = fitted(1.5, FRICTION), fitted(1.2, FRICTION, SCALE)
+    prior = log_priors(1, SCREENED)[0] - log_priors(2, SCREENED)[0]
+    found = compared(evidence(), (single, evidence(-10.0)), (pair, evidence(-10.0 + prior - behind)))
+    assert found.best_predictor is {"single": single, "pair": pair}[best]
+    assert compared(evidence()).best_predictor.hypothesis == PAPER
+
+
+def test_with_a_tolerance_the_search_goes_on_whatever_a_candidate_leaves():
+    """What it leaves is then the tolerance, which is no measure of it."""
+    within = [SimpleNamespace(observations=SimpleNamespace(channels=CHANNELS, tolerance_share=0.9))] * 8
+    given = fitted(0.9, FRICTION), evidence(NONE)
+    assert compared(evidence(), given).is_adequate
+    assert not compared(evidence(), given, whitened=within).is_adequate
+    assert compared(evidence(NONE), given, whitened=within, model=fitted(0.9)).is_adequate
+
+
 def test_a_law_beside_which_something_is_missing_counts_once_as_unexplained():
     """A law is complete with 0.12 and incomplete with 0.2; two listed mechanisms are as probable as one another."""
     law = next(iter(laws().values()))
@@ -1126,7 +1148,7 @@ def test_a_law_beside_which_something_is_missing_counts_once_as_unexplained():
         probability_of_base=0.0,
         unlisted=0.2 + 0.06,
         leading=candidates,
-        by_evidence=candidates[1:],
+        best_predictor=candidates[1],
         most_probable=candidates[1],
         certain=None,
         best_of_list=None,

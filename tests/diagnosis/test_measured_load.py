@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from ccmodel.diagnosis.calibration import calibration
 from ccmodel.diagnosis.candidate import best_start, fit, starting_points
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.observations import first_cycles
+from ccmodel.diagnosis.repeatability import estimated_tolerance
 from ccmodel.diagnosis.selection import Selection
 from ccmodel.diagnosis.verdict import judge
 from ccmodel.diagnosis.whitening import Whitened
@@ -130,6 +132,29 @@ def test_a_tolerance_may_differ_by_channel():
     assert allowing.without("tau_in_Nm").tolerance_share == 0
     every = Observations.of(recorded, TRUE, CHANNELS, step_s=0.02, tolerance=0.1)
     assert every.sigma[torque] == pytest.approx(allowing.sigma[torque])
+
+
+def test_a_tolerance_may_be_replaced_in_some_channels():
+    recorded = jaw(-0.01)
+    stated, wanted = (
+        Observations.of(recorded, TRUE, CHANNELS, step_s=0.02, tolerance={"theta_out_rad": 0.02, "tau_in_Nm": torque})
+        for torque in (0.1, 0.04)
+    )
+    found = stated.with_tolerance({"tau_in_Nm": 0.04})
+    assert found.sigma == pytest.approx(wanted.sigma)
+    assert found.tolerance.tolist() == wanted.tolerance.tolist()
+    assert found.tolerance_shares == pytest.approx(wanted.tolerance_shares)
+
+
+def test_a_tolerance_is_estimated_from_what_a_model_leaves_and_never_rises():
+    o = Observations.of(jaw(-0.01), TRUE, CHANNELS, step_s=0.02, tolerance={"tau_in_Nm": 0.1})
+    whitened = [SimpleNamespace(observations=o)] * 3
+    (share,) = o.tolerance_shares[[c == "tau_in_Nm" for c in o.channels]]
+    # The variance of the noise is 1 - share of the whole; the model leaves this and half of the rest.
+    left = {"theta_out_rad": 0.5, "tau_in_Nm": 1 - share + 0.5 * share}
+    assert estimated_tolerance(whitened, left) == pytest.approx({"tau_in_Nm": 0.1 * np.sqrt(0.5)})
+    for more, expected in ((1.7, 0.1), (0.5 * (1 - share), 0.0)):
+        assert estimated_tolerance(whitened, left | {"tau_in_Nm": more}) == pytest.approx({"tau_in_Nm": expected})
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_the_law_of_each_effect_is_recorded_as_a_table(name):
         x, y = np.array(truth["curve"]).T
         assert np.isfinite(y).all()
         assert (np.diff(x) > 0).all()
-        neutral = 1.0 if truth["slot"] in ("sliding-friction", "cable-stretch") else 0.0
+        neutral = 1.0 if truth["slot"] in ("sliding-friction", "cable-stretch", "pulley-radius") else 0.0
         larger, smaller = (np.array(draw(seed, kind, name, s).truth[0].curve)[:, 1] for s in (0.9, 0.3))
         assert np.abs(larger - neutral).max() > np.abs(smaller - neutral).max() > 0
 

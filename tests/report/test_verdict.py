@@ -151,7 +151,7 @@ def test_a_set_of_which_nothing_is_certain_is_said_with_what_else_is_possible():
     alternatives += [{"name": "drift", "place": "drive-sensor", "confidence": 0.05}]
     found = diagnosis("b", "undecided", mechanisms=[], likeliest=likeliest, alternatives=alternatives)
     assert sentence(found) == (
-        "Something is missing, and these recordings do not tell what: most probably kink at the conduit (0.71) and"
+        "Something is missing, and these recordings do not tell what: best described by kink at the conduit (0.71) and"
         " backlash at the load pulley together; also possible: drift at the drive sensor (0.05)."
     )
 

@@ -297,11 +297,15 @@ class Comparison:
 
     @property
     def is_adequate(self) -> bool:
-        """Whether no further mechanism is searched for: the best candidate leaves nothing of a further effect."""
+        """Whether no further mechanism is searched for: the best candidate leaves nothing of a further effect.
+
+        With a tolerance, that shows of the calibrated model only: what a candidate leaves becomes the tolerance.
+        """
         if not self.candidates:
             return True
         best = self.most_probable if self.probability_of_base < 0.5 else self.base
-        return self.unexplained_mean_square(best) == 0.0
+        is_open = best is not self.base and any(w.observations.tolerance_share > 0.0 for w in self.whitened)
+        return not is_open and self.unexplained_mean_square(best) == 0.0
 
     @property
     def leading_law_leaves_nothing(self) -> bool:
@@ -406,6 +410,18 @@ class Comparison:
         """
         weights = np.logaddexp.reduce(self.log_weights[1:], axis=1)
         return [self.candidates[k] for k in np.argsort(-weights, kind="stable")]
+
+    @property
+    def best_predictor(self) -> CandidateFit:
+        """Of the listed sets that evidence and prior hardly tell apart, the one with the lowest leave-one-out error.
+
+        Its members may be real, or imitate what the equations of the others leave. The calibrated model if there is no
+        plausible set.
+        """
+        listed = [c for c in self.by_evidence if c.is_plausible and not laws_in(c.hypothesis)]
+        weights = dict(zip(self.candidates, np.logaddexp.reduce(self.log_weights[1:], axis=1), strict=True))
+        near = (c for c in listed if weights[c] > weights[listed[0]] - log(settings.STRONG_EVIDENCE))
+        return min(near, key=lambda c: c.mean_square, default=self.base)
 
     def leads_on(self, size: int) -> bool:
         """Whether the best set of `size` mechanisms leaves at most half of what the best smaller one leaves.

@@ -104,7 +104,7 @@ def _entry(what: str, why: str) -> dict[str, str]:
 
 def _tolerated(tolerance: Tolerance) -> NotJudged:
     by_channel = tolerance if isinstance(tolerance, Mapping) else {"a channel": tolerance}
-    why = "within the tolerance of this run, which counts as noise"
+    why = "within the tolerance of this run, which counts as noise unless a candidate leaves less"
     return [
         _entry(f"errors below {100 * share:g} % of {name}'s peak to peak", why)
         for name, share in by_channel.items()

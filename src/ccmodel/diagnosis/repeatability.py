@@ -20,7 +20,7 @@ a standard normal prior is an observation m / (1 - v) with the variance v / (1 -
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -74,10 +74,13 @@ class Repeatability:
         By nuisance; one that is not among them has its stated spread.
     conditions : sequence of sequence of int
         Recordings of each condition, by their number.
+    tolerance : mapping of str to float
+        Estimated tolerance by channel (`estimated_tolerance`); of a channel that is not among them as stated.
     """
 
     spreads: Mapping[str, Spread]
     conditions: Sequence[Sequence[int]] = ()
+    tolerance: Mapping[str, float] = field(default_factory=dict)
 
     def ratio(self, nuisance: str) -> float:
         """Estimated over stated standard deviation."""
@@ -172,6 +175,30 @@ def estimated(whitened: Sequence["Whitened"], residuals: Sequence[NDArray]) -> R
         elif name in _CHANNEL_OF:
             found[name] = zero_spread(name, without_trend(of_name, sequences(whitened)), groups)
     return Repeatability(found, groups)
+
+
+def estimated_tolerance(whitened: Sequence["Whitened"], mean_squares: Mapping[str, float]) -> dict[str, float]:
+    """Tolerance of each channel that has one, from what a model leaves; at most the present one.
+
+    A tolerance is the standard deviation of what the equations miss. It is stated where nothing shows it, and a model
+    that leaves less shows that it was too large: then t^2 = t0^2 (1 - (1 - m) / p), where m is the model's mean square
+    and p the share of the tolerance in the variance.
+
+    Parameters
+    ----------
+    whitened : sequence of Whitened
+    mean_squares : mapping of str to float
+        Leave-one-out mean square of the model by channel; 1 is noise.
+    """
+    found = {}
+    for channel, mean_square in mean_squares.items():
+        having = [w.observations for w in whitened if channel in w.observations.channels]
+        at = [o.channels.index(channel) for o in having]
+        share = float(np.mean([o.tolerance_shares[k] for o, k in zip(having, at, strict=True)]))
+        if share > 0.0:
+            ratio = np.sqrt(np.clip(1.0 - (1.0 - mean_square) / share, 0.0, 1.0))
+            found[channel] = float(ratio * having[0].tolerance[at[0]])
+    return found
 
 
 def relative_spread(name: str, found: Deviations, groups: Sequence[Sequence[int]]) -> Spread:

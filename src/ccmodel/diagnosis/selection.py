@@ -16,7 +16,7 @@ from ccmodel.diagnosis.equation_error import other_start
 from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
 from ccmodel.diagnosis.laws import Proposal, proposals
 from ccmodel.diagnosis.normal_equations import NormalEquations
-from ccmodel.diagnosis.repeatability import estimated
+from ccmodel.diagnosis.repeatability import estimated, estimated_tolerance
 from ccmodel.diagnosis.screening import Score, Screening, screen
 from ccmodel.diagnosis.whitening import Whitened, relinearised
 from ccmodel.failure import ModelError
@@ -297,7 +297,8 @@ class Selection:
         """Leading candidates fitted again, with the covariance linearised about the best of them.
 
         The paper's model, for instance, has no ringing load, and so no error of it from the uncertain drive motion.
-        What differs from run to run is estimated again too: about a wrong model, friction seems to scatter.
+        What differs from run to run is estimated again too: about a wrong model, friction seems to scatter. So is a
+        tolerance: it is at most what the best model leaves.
         Where the initial tension is not observed, every candidate may start from the best one's calibration too: the
         cost has several minima there.
         """
@@ -309,6 +310,8 @@ class Selection:
         calibration = {name: best.values[name] for name in self.free}
         try:
             repeatability = estimated(best.whitened, best.residuals)
+            tolerance = estimated_tolerance(best.whitened, best.by_channel)
+            repeatability = replace(repeatability, tolerance=tolerance)
             whitened = each(found.whitened, lambda i, w: relinearised(w, models[i], repeatability, best.whitened[i]))
             start = found.base.values
             base = fit(whitened, found.base.hypothesis, self.free, start, self.deadline, calibration=calibration)

@@ -229,6 +229,9 @@ NEAR_NOISE = 0.2
 # values about the former. Chosen for time: it stays excluded if another covariance makes its mean square three times
 # lower.
 FAR_BEHIND = 100.0
+# Bayes factor from which evidence against a candidate is strong: Kass and Raftery 1995, Journal of the American
+# Statistical Association 90(430), 773-795, doi:10.1080/01621459.1995.10476572.
+STRONG_EVIDENCE = 20.0
 
 # --- Laws that no list holds
 

@@ -28,7 +28,7 @@ class Judgement:
     verdict : {"agrees", "explained", "learned", "undecided", "unexplained"}
     best : CandidateFit
         If the verdict is explained, the candidate of the reason that holds (`judge`); if learned, the most probable
-        candidate with a law; if undecided, the listed one of highest evidence and prior; else the calibrated model.
+        candidate with a law; if undecided, the best predictor of the listed ones; else the calibrated model.
     comparison : Comparison
     candidates : list of CandidateFit
         Those of the comparison, by descending probability.
@@ -129,9 +129,7 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     learned = sum(p for c, p in zip(candidates, found.probability, strict=True) if law_of(c.hypothesis) is not None)
     if comparison.unlisted + learned > 0.5 and max(map(found.confidence_in, names), default=0.0) <= 0.5:
         return replace(found, verdict="unexplained", single_fault_places=single_fault_places(comparison))
-    # Whether its last member is missing or imitates something, the set with the highest evidence predicts best.
-    best = next((c for c in comparison.by_evidence if law_of(c.hypothesis) is None), comparison.base)
-    return replace(found, verdict="undecided", best=best)
+    return replace(found, verdict="undecided", best=comparison.best_predictor)
 
 
 def identified(verdict: str, hypothesis: Hypothesis, confidence: Sequence[float]) -> list[int]:

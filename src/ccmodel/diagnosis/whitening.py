@@ -230,7 +230,7 @@ def whiten(
         The recording's own friction and curvatures about which the errors are linearised (`Whitened.own_means`);
         without it, those of the model.
     """
-    o = observations.with_parameters(model)
+    o = observations.with_parameters(model).with_tolerance(repeatability.tolerance)
     own = own or {}
     at = o.with_parameters(model.with_values(own))
     # The priors stay those about the model: only the effects are taken at the recording's own values.

@@ -128,6 +128,14 @@ class Observations:
         change = np.array([noise[c].sd ** 2 - self.noise[c].sd ** 2 for c in self.channels])
         return replace(self, sigma=np.sqrt(self.sigma**2 + change[:, None]), noise=noise, before_motion=before_motion)
 
+    def with_tolerance(self, tolerance: Mapping[str, float]) -> "Observations":
+        """The same with another tolerance of some channels."""
+        shares = np.array(
+            [tolerance.get(c, now) for c, now in zip(self.channels, self.tolerance.tolist(), strict=True)]
+        )
+        change = (shares**2 - self.tolerance**2) * np.ptp(self.measured, axis=1) ** 2
+        return replace(self, sigma=np.sqrt(self.sigma**2 + change[:, None]), tolerance=shares)
+
     def without(self, channel: str) -> "Observations":
         """The same without one of the channels."""
         kept = [k for k, c in enumerate(self.channels) if c != channel]
@@ -144,9 +152,15 @@ class Observations:
         return replace(self, parameters=parameters)
 
     @property
+    def tolerance_shares(self) -> NDArray:
+        """Share of the variance `sigma**2` that the tolerance makes up, averaged over samples; shape (channels,)."""
+        size = (self.tolerance * np.ptp(self.measured, axis=1))[:, None]
+        return ((size / self.sigma) ** 2).mean(axis=1)
+
+    @property
     def tolerance_share(self) -> float:
-        """Share of the variance `sigma**2` that the tolerance makes up, averaged over all samples."""
-        return float(np.mean(((self.tolerance * np.ptp(self.measured, axis=1))[:, None] / self.sigma) ** 2))
+        """Mean of `tolerance_shares`."""
+        return float(self.tolerance_shares.mean())
 
     @property
     def id(self) -> str:
