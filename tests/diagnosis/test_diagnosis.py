@@ -16,7 +16,7 @@ from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from ccmodel.diagnosis.result import alternatives_of, interval, mechanism_of
+from ccmodel.diagnosis.result import alternatives_of, interval, likeliest_of, mechanism_of
 from ccmodel.diagnosis.verdict import identified
 from ccmodel.failure import ModelError
 from ccmodel.inference import pool
@@ -328,6 +328,19 @@ def test_a_motion_without_its_columns_is_refused(clean, tmp_path):
     asked = [tmp_path / "motion.csv", "--model", clean[1] / "model.json", "--batch", clean[0]]
     with pytest.raises(InputError, match="no column time_s and no theta_in_rad"):
         raise run("simulate", *asked, "--out", tmp_path / "said.csv").exception
+
+
+def test_the_model_of_an_undecided_verdict_is_stated_with_its_values():
+    hypothesis = Hypothesis((("load-cell-offset", "load-sensor"),))
+    values = {"load-cell-offset/load-sensor/offset": 0.5}
+    best = CandidateFit(hypothesis, [], {}, values, [], [], np.array([[0.04**2]]), np.inf, [], [])
+    judgement = SimpleNamespace(verdict="undecided", best=best, confidences=[0.6])
+    (stated,) = likeliest_of(judgement)
+    assert (stated["name"], stated["place"], stated["confidence"]) == ("load-cell-offset", "load-sensor", 0.6)
+    (offset,) = stated["parameters"]
+    assert (offset["value"], offset["high"]) == (0.5, pytest.approx(0.5 + 1.645 * 0.04, rel=1e-3))
+    judgement.verdict = "explained"
+    assert likeliest_of(judgement) == []
 
 
 def test_a_number_stands_where_a_finer_solver_would_have_it():

@@ -68,7 +68,7 @@ def report(
         "mechanisms": [mechanism_of(best, k, _below_certainty(confidence[k])) for k in of_list],
         "laws": laws,
         "alternatives": alternatives_of(judgement, dict(named)),
-        "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
+        "likeliest": likeliest_of(judgement),
         "nearest": _nearest(judgement, calibrated),
         "fit": {
             "held_out": [w.observations.id for w in whitened] if len(whitened) > 1 else [],
@@ -115,6 +115,14 @@ def alternatives_of(judgement: Judgement, named: Mapping[str, str]) -> list[dict
     others += [(*acting, _below_certainty(_place_probability(acting, confidence))) for acting in sorted(elsewhere)]
     ranked = sorted(others, key=lambda one: -one[2])[: settings.MOST_ALTERNATIVES]
     return [{"name": n, "place": p, "confidence": round(c, 4)} for n, p, c in ranked if c > settings.ALTERNATIVE]
+
+
+def likeliest_of(judgement: Judgement) -> list[dict]:
+    """The mechanisms of an undecided verdict's model, with the values that it predicts with; of other verdicts none."""
+    if judgement.verdict != "undecided":
+        return []
+    best, confidence = judgement.best, judgement.confidences
+    return [mechanism_of(best, k, _below_certainty(confidence[k])) for k in range(len(best.hypothesis.acting))]
 
 
 def _below_certainty(confidence: float) -> float:

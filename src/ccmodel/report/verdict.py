@@ -121,7 +121,7 @@ def _undecided(diagnosis: Mapping, missing: str) -> str:
         most = f"{joined([named.get(one, one) for one in together])} together"
         also = f"also possible: {joined(others)}"
         return f"Something {missing}, and these recordings do not tell what: best described by {most}; {also}."
-    names = [f"{' and '.join(together)} together"] if len(together) > 1 else list(named.values())
+    names = [f"{joined(together)} together"] if len(together) > 1 else list(named.values())
     if not names:
         return f"Something {missing}, and these recordings do not tell what."
     if len(names) == 1:
