@@ -130,6 +130,8 @@ class Observations:
 
     def with_tolerance(self, tolerance: Mapping[str, float]) -> "Observations":
         """The same with another tolerance of some channels."""
+        if not tolerance:
+            return self
         shares = np.array(
             [tolerance.get(c, now) for c, now in zip(self.channels, self.tolerance.tolist(), strict=True)]
         )
