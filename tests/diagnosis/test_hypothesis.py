@@ -48,8 +48,8 @@ def test_probes_are_plausible_and_within_reach_of_a_fit(hypothesis):
 def test_a_probe_is_scaled_about_the_neutral_value():
     drag = Hypothesis((("constant-drag", "conduit"),))
     probe = next(drag.screening_values())
-    ((key, value),) = probe.items()
-    assert scaled(drag, probe, 2.0)[key] == pytest.approx(2 * value)
+    key = "constant-drag/conduit/f0"
+    assert scaled(drag, probe, 2.0) == pytest.approx(probe | {key: 2 * probe[key]})
     assert scaled(drag, probe, -1.0) is None
     gain = Hypothesis((("torque-scale", "load-sensor"),))
     ((key, value),) = next(gain.screening_values()).items()

@@ -12,13 +12,10 @@ Source: Gao, Luedtke, Gourdon, Ruths, Israelachvili and Landman, Frictional forc
 molecular to the macroscopic scale, Journal of Physical Chemistry B 108(11), 3410-3425, 2004.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Parameter, Settings, optional_share
-from ccmodel.mechanisms.kink import peak
 
 # The drag over mu and the bend: the tension at which it is as large as Coulomb friction. Below a tenth of a newton the
 # factor of friction that it is would grow without bound.
@@ -27,7 +24,6 @@ FLOOR_N = 0.1
 # Standard deviation of a place that may be anywhere. A drag that is spread all along does not determine it.
 PLACE_SD = 0.3
 _PER_LENGTH = Parameter("per_length", "N/m", 0.1, 5.0, 0.5, "drag over the length of the conduit")
-_AT_ONE_PLACE = Parameter("at_one_place", "N/m", 0.1, 50.0, 5.0, "height of a peak that stands for a seal's drag")
 _S = Parameter(
     "s",
     "1",
@@ -41,11 +37,6 @@ _S = Parameter(
     default=0.5,
     prior_sd=PLACE_SD,
 )
-
-
-def _of_position(share: NDArray, values: Mapping[str, float]) -> NDArray:
-    """Drag over the length, with the peak that a law of the position has in place of a step."""
-    return values["per_length"] + values["at_one_place"] * peak(share, values["s"])
 
 
 def drag_shares(settings: Settings, cell_m: NDArray) -> NDArray:
@@ -90,13 +81,15 @@ MECHANISM = Mechanism(
             lambda tension, values: 1 + values["as_large_at"] / np.maximum(tension, FLOOR_N),
             (_AS_LARGE_AT,),
         ),
-        Curve(
-            SLIDING_FRICTION,
-            "speed",
-            lambda speed, values: np.full(speed.shape, values["per_length"]),
-            (_PER_LENGTH,),
-            form="drag",
+        *(
+            Curve(
+                SLIDING_FRICTION,
+                argument,
+                lambda x, values: np.full(x.shape, values["per_length"]),
+                (_PER_LENGTH,),
+                form="drag",
+            )
+            for argument in ("speed", "position-along-conduit")
         ),
-        Curve(SLIDING_FRICTION, "position-along-conduit", _of_position, (_PER_LENGTH, _AT_ONE_PLACE, _S), form="drag"),
     ),
 )

@@ -40,19 +40,19 @@ def _modifies_physics(settings: Settings, values: Mapping[str, float]) -> None:
     settings.kinks += (Kink(values["s"], values["beta"], values["hold"]),)
 
 
-def peak(share: NDArray, s: float) -> NDArray:
+def _peak(share: NDArray, s: float) -> NDArray:
     """A triangle of height 1 about `s`."""
     return (1 - np.abs(share - s) / HALF_WIDTH).clip(0.0)
 
 
 def _of_position(share: NDArray, values: Mapping[str, float]) -> NDArray:
     """Friction over that of an even bend."""
-    return 1 + values["rise"] * peak(share, values["s"])
+    return 1 + values["rise"] * _peak(share, values["s"])
 
 
 def _bend_by_position(share: NDArray, values: Mapping[str, float]) -> NDArray:
     """Bend of the kink over the conduit's length, rad."""
-    return values["beta"] / HALF_WIDTH * peak(share, values["s"])
+    return values["beta"] / HALF_WIDTH * _peak(share, values["s"])
 
 
 _BETA = Parameter("beta", "rad", 0.2, 1.5, 0.6, "angle of the bend")
