@@ -111,39 +111,39 @@ def _bristle_lengths(effects: Effects, numerics: Numerics) -> NDArray:
 
 
 def _drag_shares(effects: Effects, grid: Grid) -> NDArray:
-    """Share of the constant drag in each cell, shape (n,): by length, or that of one or two seals.
+    """Share of the constant drag in each cell, shape (n,): by length, or that of one or two seals."""
+    if effects.drag_at_share is None:
+        return grid.cell_length_m / grid.cell_length_m.sum()
+    near, far = (_at_place(share, grid) for share in (effects.drag_at_share, effects.drag_far_share))
+    return (1.0 - effects.drag_far_part) * near + effects.drag_far_part * far
 
-    A seal is shared between the two nodes around its place, so that its mean place is exact on any grid.
+
+def _at_place(share: float, grid: Grid) -> NDArray:
+    """Shares of what acts at one place, at a share of the length, in each cell; shape (n,).
+
+    It is shared between the two nodes around its place, so that its mean place is exact on any grid.
     """
     ends = np.cumsum(grid.cell_length_m)
-    if effects.drag_at_share is None:
-        return grid.cell_length_m / ends[-1]
-    centre = (ends - grid.cell_length_m / 2) / ends[-1]
-    of_cell = np.eye(centre.size)
-    near, far = (
-        [np.interp(at, centre, one) for one in of_cell] for at in (effects.drag_at_share, effects.drag_far_share)
-    )
-    return (1.0 - effects.drag_far_part) * np.array(near) + effects.drag_far_part * np.array(far)
+    centre = ends - grid.cell_length_m / 2
+    at = np.interp(share * ends[-1], centre, np.arange(centre.size))
+    before = min(int(at), max(centre.size - 2, 0))
+    shares = np.zeros(centre.size)
+    shares[before] += 1 - (at - before)
+    shares[min(before + 1, centre.size - 1)] += at - before
+    return shares
 
 
 def _half_bend(grid: Grid, effects: Effects, friction_coefficient: float) -> NDArray:
-    """Half of mu phi of each cell, kinks included; shape (2, n).
-
-    A kink is shared between the two nodes around its place, so that its mean place is exact on any grid.
-    """
+    """Half of mu phi of each cell, kinks included; shape (2, n)."""
     bend = grid.cell_bend_rad.copy()
     ends = np.cumsum(grid.cell_length_m)
-    centre = ends - grid.cell_length_m / 2
     for kink in effects.kinks:
         if kink.spread_m:
             starts = ends - grid.cell_length_m
             low, high = (kink.place_share * ends[-1] + side * kink.spread_m / 2 for side in (-1, 1))
             bend += kink.bend_rad * (np.minimum(ends, high) - np.maximum(starts, low)).clip(0.0) / kink.spread_m
             continue
-        at = np.interp(kink.place_share * ends[-1], centre, np.arange(centre.size))
-        before = min(int(at), max(centre.size - 2, 0))
-        bend[before] += (1 - (at - before)) * kink.bend_rad
-        bend[min(before + 1, centre.size - 1)] += (at - before) * kink.bend_rad
+        bend += kink.bend_rad * _at_place(kink.place_share, grid)
     ratio = np.array([[1.0], [effects.cable_asymmetry.friction_ratio]])
     return friction_coefficient * ratio * bend / 2
 

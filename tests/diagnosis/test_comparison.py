@@ -58,7 +58,7 @@ VALUES = {
 }
 CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
 # Of samples that are the same in every channel, one is enough.
-OBSERVATIONS = SimpleNamespace(channels=CHANNELS, tolerance_share=0.0)
+OBSERVATIONS = SimpleNamespace(channels=CHANNELS, tolerance_share=0.0, has_tolerance=False)
 WHITENED = [SimpleNamespace(observations=OBSERVATIONS, measured=np.zeros((5, 1)))] * 8
 # Log evidence at which nothing is left, and of something that is far from it.
 NONE, FAR = -10.0, -500.0
@@ -1123,8 +1123,9 @@ def test_the_best_predictor_errs_least_of_what_evidence_hardly_tells_apart(behin
 
 
 def test_with_a_tolerance_the_search_goes_on_whatever_a_candidate_leaves():
-    """What it leaves is then the tolerance, which is no measure of it."""
-    within = [SimpleNamespace(observations=SimpleNamespace(channels=CHANNELS, tolerance_share=0.9))] * 8
+    """The tolerance is estimated from what it leaves, and does not show whether something is missing beside it."""
+    allowing = SimpleNamespace(channels=CHANNELS, tolerance_share=0.9, has_tolerance=True)
+    within = [SimpleNamespace(observations=allowing)] * 8
     given = fitted(0.9, FRICTION), evidence(NONE)
     assert compared(evidence(), given).is_adequate
     assert not compared(evidence(), given, whitened=within).is_adequate

@@ -299,12 +299,13 @@ class Comparison:
     def is_adequate(self) -> bool:
         """Whether no further mechanism is searched for: the best candidate leaves nothing of a further effect.
 
-        With a tolerance, that shows of the calibrated model only: what a candidate leaves becomes the tolerance.
+        A tolerance is estimated from what the best candidate leaves, and then shows nothing about it: only the
+        calibrated model can be adequate.
         """
         if not self.candidates:
             return True
         best = self.most_probable if self.probability_of_base < 0.5 else self.base
-        is_open = best is not self.base and any(w.observations.tolerance_share > 0.0 for w in self.whitened)
+        is_open = best is not self.base and any(w.observations.has_tolerance for w in self.whitened)
         return not is_open and self.unexplained_mean_square(best) == 0.0
 
     @property

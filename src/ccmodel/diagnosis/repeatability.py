@@ -264,7 +264,7 @@ def friction_p_values(whitened: Sequence["Whitened"], residuals: Sequence[NDArra
     is_fitted : bool
         Whether the fit determines the mean friction; otherwise deviations count from the model's friction.
     """
-    if len(whitened) < settings.FEWEST_FOR_SCATTER or any(w.observations.tolerance.any() for w in whitened):
+    if len(whitened) < settings.FEWEST_FOR_SCATTER or any(w.observations.has_tolerance for w in whitened):
         return FrictionPValues()
     found, runs = deviations(whitened, residuals, FRICTION), sequences(whitened)
     about_trend = without_trend(found, runs)

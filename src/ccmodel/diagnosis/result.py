@@ -48,7 +48,7 @@ def report(
         When the isolation of a fault is given up.
     """
     best, base, whitened = judgement.best, judgement.calibrated, judgement.whitened
-    confidence, of_list = judgement.confidences, judgement.identified
+    of_list = judgement.identified
     named = [best.hypothesis.acting[k] for k in of_list]
     failures: NotJudged = []
     laws = laws_of(judgement)
@@ -65,7 +65,7 @@ def report(
         "verdict": judgement.verdict,
         "is_held": base.hypothesis.is_frozen,
         "location": located,
-        "mechanisms": [mechanism_of(best, k, _below_certainty(confidence[k])) for k in of_list],
+        "mechanisms": _stated(judgement, of_list),
         "laws": laws,
         "alternatives": alternatives_of(judgement, dict(named)),
         "likeliest": likeliest_of(judgement),
@@ -121,8 +121,13 @@ def likeliest_of(judgement: Judgement) -> list[dict]:
     """The mechanisms of an undecided verdict's model, with the values that it predicts with; of other verdicts none."""
     if judgement.verdict != "undecided":
         return []
-    best, confidence = judgement.best, judgement.confidences
-    return [mechanism_of(best, k, _below_certainty(confidence[k])) for k in range(len(best.hypothesis.acting))]
+    return _stated(judgement, range(len(judgement.best.hypothesis.acting)))
+
+
+def _stated(judgement: Judgement, positions: Sequence[int]) -> list[dict]:
+    """Mechanisms of a verdict's model, by their positions, with their confidences."""
+    confidence = judgement.confidences
+    return [mechanism_of(judgement.best, k, _below_certainty(confidence[k])) for k in positions]
 
 
 def _below_certainty(confidence: float) -> float:

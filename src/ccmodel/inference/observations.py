@@ -154,6 +154,11 @@ class Observations:
         return replace(self, parameters=parameters)
 
     @property
+    def has_tolerance(self) -> bool:
+        """Whether a channel has a tolerance."""
+        return bool(self.tolerance.any())
+
+    @property
     def tolerance_shares(self) -> NDArray:
         """Share of the variance `sigma**2` that the tolerance makes up, averaged over samples; shape (channels,)."""
         size = (self.tolerance * np.ptp(self.measured, axis=1))[:, None]

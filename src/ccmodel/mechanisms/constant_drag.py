@@ -24,19 +24,6 @@ FLOOR_N = 0.1
 # Standard deviation of a place that may be anywhere. A drag that is spread all along does not determine it.
 PLACE_SD = 0.3
 _PER_LENGTH = Parameter("per_length", "N/m", 0.1, 5.0, 0.5, "drag over the length of the conduit")
-_S = Parameter(
-    "s",
-    "1",
-    0.0,
-    1.0,
-    0.5,
-    "place of a seal, as a share of the length",
-    neutral=0.5,
-    scale="linear",
-    screening_grid=(0.1, 0.9),
-    default=0.5,
-    prior_sd=PLACE_SD,
-)
 
 
 def drag_shares(settings: Settings, cell_m: NDArray) -> NDArray:
@@ -46,11 +33,8 @@ def drag_shares(settings: Settings, cell_m: NDArray) -> NDArray:
     """
     along = cell_m / cell_m.sum()
     middle = np.cumsum(along) - along / 2
-    k = int(np.clip(np.searchsorted(middle, settings.drag_place), 1, middle.size - 1)) if middle.size > 1 else 0
-    seal = np.zeros(along.size)
-    beyond = (settings.drag_place - middle[k - 1]) / (middle[k] - middle[k - 1]) if k else 1.0
-    seal[k] = np.clip(beyond, 0.0, 1.0)
-    seal[k - 1] += 1.0 - seal[k]
+    number = np.arange(along.size)
+    seal = (1.0 - np.abs(number - np.interp(settings.drag_place, middle, number))).clip(0.0)
     return (1.0 - settings.drag_local) * along + settings.drag_local * seal
 
 
@@ -69,7 +53,19 @@ MECHANISM = Mechanism(
     parameters=(
         Parameter("f0", "N", 0.1, 5.0, 0.5, "drag of one whole cable"),
         optional_share("local", "share of the drag that acts at one place"),
-        _S,
+        Parameter(
+            "s",
+            "1",
+            0.0,
+            1.0,
+            0.5,
+            "place of a seal, as a share of the length",
+            neutral=0.5,
+            scale="linear",
+            screening_grid=(0.1, 0.9),
+            default=0.5,
+            prior_sd=PLACE_SD,
+        ),
     ),
     mistaken_for=("load-dependent-friction", "pulley-friction"),
     depends_on_time=False,

@@ -329,7 +329,8 @@ def _constants(
     piece[rows.RELAXING][:, segments] = settings.relaxing_share
     piece[rows.SHARE][:, segments] = segment / length
     node[rows.HALF_BEND][:, cells] = friction * ratio_mu * (grid.cell_rad + added_rad) / 2
-    node[rows.DRAG][:, cells] = settings.drag_N * drag_shares(settings, cell)
+    if settings.drag_N:
+        node[rows.DRAG][:, cells] = settings.drag_N * drag_shares(settings, cell)
     if settings.added_drag is not None:
         node[rows.DRAG][:, cells] += settings.added_drag.at(grid.middle_m / length) * cell
     drag = settings.conduit_drag
