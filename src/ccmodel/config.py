@@ -118,13 +118,12 @@ class Config(TypedModel):
         fits = [n for n, f in self.fits.items() if f.batches == EACH or any(self.same_rig(batch, b) for b in f.batches)]
         return [ESTIMATED, *fits, *(MODEL_FILES if self.diagnosed([batch]) else [])]
 
-    def parameters_of(self, study: Study | Accuracy, batch: str) -> str:
-        """Name of the parameter set that a study takes for a batch.
+    def parameters_of(self, wanted: str | None, batch: str) -> str:
+        """Name of the parameter set that a study takes for a batch, if it wants this one, or any.
 
-        The study's own; without one, the first fit of the batch's rig, or the calibrated model of its diagnosis, or its
-        estimates.
+        Any is the first fit of the batch's rig, or the calibrated model of its diagnosis, or its estimates.
         """
-        return study.parameters or self.sets_of(batch)[:2][-1]
+        return wanted or self.sets_of(batch)[:2][-1]
 
     def same_rig(self, one: str, other: str) -> bool:
         """Whether two batches were recorded on the same rig."""
@@ -197,7 +196,9 @@ def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
     expanded: dict[str, Study] = {}
     for name, study in config.studies.items():
         wanted = batches if study.batches == EACH else study.batches
-        if missing := [batch for batch in wanted if config.parameters_of(study, batch) not in config.sets_of(batch)]:
+        if missing := [
+            batch for batch in wanted if config.parameters_of(study.parameters, batch) not in config.sets_of(batch)
+        ]:
             why = "not diagnosed" if study.parameters in MODEL_FILES else "of another rig than the fit's"
             raise InputError(
                 f"studies.{name}: there are no '{study.parameters}' parameters of {', '.join(missing)}: {why}"

@@ -4,7 +4,6 @@ import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -164,8 +163,7 @@ class Recording:
         InputError
             If the recording does not have the channel.
         """
-        # By name: no computation on recordings depends on how they are drawn.
-        return import_module("ccmodel.api.figures").channels([self], channel)
+        return plotted([self], channel)
 
     @property
     def session(self) -> str:
@@ -194,6 +192,16 @@ class Recording:
         channels, derived_from = dict(channels), dict(derived_from)
         accuracy = self.accuracy if origin == self.origin else {}
         return replace(self, channels=channels, derived_from=derived_from, origin=origin, accuracy=accuracy)
+
+
+def plotted(recordings: Sequence[Recording], channel: str | None = None) -> "Figure":
+    """Figure of the channels of a batch's recordings, or of one channel alone (`Recording.plot`)."""
+    # Here, since matplotlib takes long to import.
+    from ccmodel.session_figures import channels_over_time
+
+    first = recordings[0]
+    recorded = {r.id: (r.time_s, r.channels) for r in recordings}
+    return channels_over_time(recorded, f"{first.batch}: {ORIGIN[first.origin]}", channel)
 
 
 def stride(recording: Recording, step_s: float | None) -> int:

@@ -11,8 +11,6 @@ from ccmodel.diagnosis.candidate import fit
 from ccmodel.diagnosis.comparison import Comparison
 from ccmodel.diagnosis.hypothesis import PAPER
 from ccmodel.diagnosis.repeatability import (
-    FRICTION,
-    PRETENSION,
     Deviations,
     between_p_value,
     conditions,
@@ -33,6 +31,7 @@ from ccmodel.diagnosis.repeatability import (
 from ccmodel.diagnosis.result import deviating_friction
 from ccmodel.diagnosis.result import report as diagnosed
 from ccmodel.diagnosis.settings import MOST_SCATTER, SPREAD_FREEDOM, TREND_LEVEL
+from ccmodel.diagnosis.spreads import FRICTION, PRETENSION
 from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.diagnosis.whitening import relinearised, whiten
 from ccmodel.inference.observations import Observations

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_pages import content, diagnosis
 
-from ccmodel.report.figures import subplots
+from ccmodel.figures import subplots
 from ccmodel.report.page import write_page
 from ccmodel.studies.diagnosis.page import (
     MARKS,

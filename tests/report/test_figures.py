@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from builders import recording
+from ccmodel.figures import FORMATS, STYLE, legend_below, save_figure, stamp_figure, title_figure
 from ccmodel.provenance import content_digest
 from ccmodel.recording import write_recordings
-from ccmodel.report.figures import FORMATS, STYLE, legend_below, save_figure, stamp_figure, title_figure
 from ccmodel.studies.loops.settings import Measuring, Study
 from ccmodel.studies.run import Run, run_study
 

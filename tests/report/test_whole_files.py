@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from builders import recording
 from ccmodel.errors import COLUMNS
+from ccmodel.figures import save_figure
 from ccmodel.recording import write_recordings
 from ccmodel.report import tables
-from ccmodel.report.figures import save_figure
 from ccmodel.report.page import writing
 
 # Bytes that a file may have while the disk is "full".

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ccmodel.errors import last_cycle
+from ccmodel.figures import save_figure
 from ccmodel.repeats import Estimate, condition_of, difference, estimates, pooled_scatter
-from ccmodel.report.figures import save_figure
 from ccmodel.studies.claims import model_alone, model_runs, study
 from ccmodel.studies.claims.claim import Row, Verdict, spread_percent
 from ccmodel.studies.claims.figure import _reach, model_figure, recordings_figure

@@ -11,8 +11,8 @@ import pytest
 
 from builders import recording
 from ccmodel.channels import TABLE
+from ccmodel.figures import stamp_figure
 from ccmodel.model.run import PRESCRIBED
-from ccmodel.report.figures import stamp_figure
 from ccmodel.studies.loops.settings import Figure, Measuring, Study
 from ccmodel.studies.loops.study import _grid
 from ccmodel.studies.loops.study import draw as draw_study

@@ -1,9 +1,7 @@
-"""Figures of batches, fits and diagnoses for a session of Python: they use the backend that the user has."""
+"""Figures of predictions, fits and diagnoses for a session of Python."""
 
-from collections.abc import Callable, Sequence
-from functools import wraps
+from collections.abc import Sequence
 
-import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -11,58 +9,21 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ccmodel.api.batch import Batch
-from ccmodel.channels import CHANNELS, MEASURED, TABLE, THETA_IN
+from ccmodel.channels import CHANNELS, MEASURED, TABLE
 from ccmodel.diagnosis.run import Calibration
 from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.errors import is_compared
+from ccmodel.figures import COLOURS, legend_below, title_figure
 from ccmodel.recording import ORIGIN, Recording
-from ccmodel.report.figures import COLOURS, LINES, STYLE, legend_below, title_figure
 from ccmodel.report.verdict import NOT_ACCEPTED, SYMBOL
+from ccmodel.session_figures import session_figure, short_label
 from ccmodel.typed import InputError, advice
 
 # Most recordings that have a column of their own.
 MOST_COLUMNS = 6
 
 
-def _figure(draw: Callable[..., Figure]) -> Callable[..., Figure]:
-    """Draw in the style of all figures; a notebook shows a figure that is returned, and must not show it twice."""
-
-    @wraps(draw)
-    def drawn(*arguments: object) -> Figure:
-        with plt.rc_context(STYLE):
-            figure = draw(*arguments)
-            is_interactive = matplotlib.is_interactive()
-        # The first figure of a session starts its backend; what that sets must outlive the style.
-        matplotlib.interactive(is_interactive)
-        if "inline" in matplotlib.get_backend():
-            plt.close(figure)
-        return figure
-
-    return drawn
-
-
-@_figure
-def channels(recordings: Sequence[Recording], channel: str | None = None) -> Figure:
-    """Channels over time, a panel for each, with all recordings that have it."""
-    recorded = [c for c in CHANNELS if any(c in r for r in recordings)]
-    if channel is not None and channel not in recorded:
-        raise InputError(f"no recording has the channel '{channel}'; {advice(channel, recorded)}")
-    shown = [channel] if channel else [c for c in recorded if c in (THETA_IN, *MEASURED)]
-    figure, axes = plt.subplots(
-        len(shown), 1, figsize=(9, 0.9 + (2.4 if channel else 1.5) * len(shown)), sharex=True, squeeze=False
-    )
-    for ax, name in zip(axes[:, 0], shown, strict=True):
-        for k, r in enumerate(r for r in recordings if name in r):
-            style = {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k // len(COLOURS) % len(LINES)]}
-            ax.plot(r.time_s, TABLE[name].scale * r[name], lw=1.0, label=r.id, **style)
-        ax.set_ylabel(_label(name))
-    axes[-1, 0].set_xlabel("time (s)")
-    title_figure(figure, f"{recordings[0].batch}: {ORIGIN[recordings[0].origin]}")
-    legend_below(figure, axes)
-    return figure
-
-
-@_figure
+@session_figure
 def compared(pairs: Sequence[tuple[Recording, Recording]], channel: str | None = None) -> Figure:
     """Recorded and predicted channels over time, by channel (rows) and recording (columns)."""
     common = [c for c in CHANNELS if any(is_compared(*pair, c) for pair in pairs)]
@@ -83,14 +44,14 @@ def compared(pairs: Sequence[tuple[Recording, Recording]], channel: str | None =
         axes[0, j].set_title(recorded.id, fontsize=9)
         axes[-1, j].set_xlabel("time (s)")
     for ax, name in zip(axes[:, 0], rows, strict=True):
-        ax.set_ylabel(_label(name))
+        ax.set_ylabel(short_label(name))
     some = f"; the first {len(columns)} of {len(pairs)}" if len(columns) < len(pairs) else ""
     title_figure(figure, f"{pairs[0][0].batch}: {ORIGIN[pairs[0][0].origin]} and prediction{some}")
     legend_below(figure, axes)
     return figure
 
 
-@_figure
+@session_figure
 def residuals(calibration: Calibration, batch: Batch) -> Figure:
     """Residuals of the calibrated model over the noise floor, by channel (rows) and recording (columns)."""
     whitened = calibration.fit.whitened
@@ -132,7 +93,7 @@ def _floor(whitened: Whitened) -> NDArray:
     return np.array([whitened.noise_floor[channel] for channel in whitened.observations.channels])
 
 
-@_figure
+@session_figure
 def errors(table: pd.DataFrame, batch: Batch, verdict: str) -> Figure:
     """Held-out errors by channel over the noise floor: a bar for each model."""
     models = {"before": "calibrated model"}
@@ -158,8 +119,3 @@ def errors(table: pd.DataFrame, batch: Batch, verdict: str) -> Figure:
     title_figure(figure, f"{batch.name}, verdict '{verdict}': {ORIGIN[batch.origin]}")
     legend_below(figure, np.array([ax]))
     return figure
-
-
-def _label(channel: str) -> str:
-    """Symbol and unit of a channel, for an axis with little room."""
-    return f"{TABLE[channel].tex} ({TABLE[channel].plot_unit or TABLE[channel].unit})"

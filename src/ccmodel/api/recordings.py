@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 import xarray as xr
 
-from ccmodel.recording import Recording
+from ccmodel.recording import Recording, plotted
 from ccmodel.typed import InputError, advice
 
 if TYPE_CHECKING:
@@ -67,6 +67,4 @@ class Recordings:
         InputError
             If no recording has the channel.
         """
-        from ccmodel.api import figures
-
-        return figures.channels(self.recordings, channel)
+        return plotted(self.recordings, channel)

@@ -28,12 +28,8 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift
 from ccmodel.diagnosis.discrepancy import Discrepancy, Evidence, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis, laws_in
-from ccmodel.diagnosis.repeatability import (
-    FRICTION,
-    FRICTION_SCALE,
-    FrictionPValues,
-    friction_p_values,
-)
+from ccmodel.diagnosis.repeatability import FrictionPValues, friction_p_values
+from ccmodel.diagnosis.spreads import FRICTION, FRICTION_SCALE
 from ccmodel.diagnosis.whitening import Whitened
 
 # Beyond it, an exponential function is infinite.

@@ -20,78 +20,22 @@ a standard normal prior is an observation m / (1 - v) with the variance v / (1 -
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import MEASURED, THETA_IN, ZERO_OF, short_name, unit_of
 from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.spreads import FRICTION, PRETENSION, Repeatability, Spread
+from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.distributions import fisher_tail, student_tail
 from ccmodel.inference.observations import Observations
 from ccmodel.recording import Recording
 
-if TYPE_CHECKING:
-    from ccmodel.diagnosis.whitening import Whitened
-
-FRICTION, PRETENSION = "friction_coefficient", "pretension_scale"
-# Parameter that is the friction of a single recording over the rig's.
-FRICTION_SCALE = "friction_scale"
 _WORDS = {FRICTION: "friction", PRETENSION: "initial tension"}
 _CHANNEL_OF = {zero: channel for channel, zero in ZERO_OF.items()}
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Standard deviation of a nuisance from run to run.
-
-    Attributes
-    ----------
-    nuisance : str
-        Name of its parameter.
-    ratio : float
-        Estimated over stated standard deviation.
-    source : {"repeats", "scatter", "assumed"}
-        Differences of repeats, scatter of all recordings, or the stated value.
-    recordings : int
-        Number of recordings that it rests on; 0 if assumed.
-    """
-
-    nuisance: str
-    ratio: float = 1.0
-    source: str = "assumed"
-    recordings: int = 0
-
-
-@dataclass(frozen=True)
-class Repeatability:
-    """Spreads of the nuisances, and the conditions of the recordings.
-
-    Attributes
-    ----------
-    spreads : mapping of str to Spread
-        By nuisance; one that is not among them has its stated spread.
-    conditions : sequence of sequence of int
-        Recordings of each condition, by their number.
-    tolerance : mapping of str to float
-        Estimated tolerance by channel (`estimated_tolerance`); of a channel that is not among them as stated.
-    """
-
-    spreads: Mapping[str, Spread]
-    conditions: Sequence[Sequence[int]] = ()
-    tolerance: Mapping[str, float] = field(default_factory=dict)
-
-    def ratio(self, nuisance: str) -> float:
-        """Estimated over stated standard deviation."""
-        return self.spreads[nuisance].ratio if nuisance in self.spreads else 1.0
-
-    def applied(self, nuisances: Sequence[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
-        """Name, value and stated standard deviation of nuisances, with the estimated standard deviations instead."""
-        return [(name, value, self.ratio(name) * spread) for name, value, spread in nuisances]
-
-
-STATED = Repeatability({})
 
 
 @dataclass(frozen=True)
@@ -157,13 +101,13 @@ def _is_same(a: Recording, b: Recording, channel: str, share: float, least: floa
     return bool(apart <= max(share * np.ptp(first), least))
 
 
-def deviations(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], nuisance: str) -> Deviations:
+def deviations(whitened: Sequence[Whitened], residuals: Sequence[NDArray], nuisance: str) -> Deviations:
     """Deviations of a nuisance in each recording from the residuals of a fit, nuisances included."""
     found = [w.deviation(nuisance, e) for w, e in zip(whitened, residuals, strict=True)]
     return Deviations(*np.array(found, dtype=float).reshape(-1, 2).T)
 
 
-def estimated(whitened: Sequence["Whitened"], residuals: Sequence[NDArray]) -> Repeatability:
+def estimated(whitened: Sequence[Whitened], residuals: Sequence[NDArray]) -> Repeatability:
     """Spreads of friction and of the sensors' zeros from the residuals of a fit of the calibrated model."""
     groups = conditions([w.observations for w in whitened])
     names = dict.fromkeys(name for w in whitened for name, _, _ in w.scalar_nuisances)
@@ -177,7 +121,7 @@ def estimated(whitened: Sequence["Whitened"], residuals: Sequence[NDArray]) -> R
     return Repeatability(found, groups)
 
 
-def estimated_tolerance(whitened: Sequence["Whitened"], mean_squares: Mapping[str, float]) -> dict[str, float]:
+def estimated_tolerance(whitened: Sequence[Whitened], mean_squares: Mapping[str, float]) -> dict[str, float]:
     """Tolerance of each channel that has one, from what a model leaves; at most the present one.
 
     A tolerance is the standard deviation of what the equations miss. It is stated where nothing shows it, and a model
@@ -253,7 +197,7 @@ class FrictionPValues(NamedTuple):
         return log_bayes_factor(self.about_trend)
 
 
-def friction_p_values(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool) -> FrictionPValues:
+def friction_p_values(whitened: Sequence[Whitened], residuals: Sequence[NDArray], is_fitted: bool) -> FrictionPValues:
     """P-values of friction; 1 for fewer than four recordings or with a tolerance, which friction takes up some of.
 
     Parameters
@@ -273,7 +217,7 @@ def friction_p_values(whitened: Sequence["Whitened"], residuals: Sequence[NDArra
     return FrictionPValues(scatter, trend_p_value(found, runs), rest)
 
 
-def _scatter(whitened: Sequence["Whitened"], found: Deviations, is_fitted: bool) -> float:
+def _scatter(whitened: Sequence[Whitened], found: Deviations, is_fitted: bool) -> float:
     """P-value of the scatter within and between conditions."""
     groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
     tests = within_p_value(found, groups), between_p_value(found, groups, is_fitted)
@@ -321,7 +265,7 @@ def between_p_value(found: Deviations, groups: Sequence[Sequence[int]], is_fitte
     return fisher_tail(ratio, between_freedom, settings.SPREAD_FREEDOM + freedom)
 
 
-def friction_of_deviating(whitened: Sequence["Whitened"], residuals: Sequence[NDArray]) -> dict[str, float]:
+def friction_of_deviating(whitened: Sequence[Whitened], residuals: Sequence[NDArray]) -> dict[str, float]:
     """Relative difference of friction from that of the others, by id of the recordings in which it is clear.
 
     Parameters as of `friction_p_values`. A trend is no difference. See `deviating`.
@@ -334,7 +278,7 @@ def friction_of_deviating(whitened: Sequence["Whitened"], residuals: Sequence[ND
     return {whitened[i].observations.id: float(ratios[i] / others) - 1.0 for i in apart}
 
 
-def _stated_share(w: "Whitened") -> float:
+def _stated_share(w: Whitened) -> float:
     """Stated standard deviation of a recording's friction over the friction itself; NaN without it."""
     shares = (sd / value for name, value, sd in w.scalar_nuisances if name == FRICTION)
     return next(shares, np.nan) / w.repeatability.ratio(FRICTION)
@@ -368,7 +312,7 @@ def _p_value_of_one(found: Deviations, one: int, others: list[int]) -> float:
     return 2 * student_tail(float(apart / np.sqrt(variance)), settings.SPREAD_FREEDOM + freedom)
 
 
-def sequences(whitened: Sequence["Whitened"]) -> list[list[int]]:
+def sequences(whitened: Sequence[Whitened]) -> list[list[int]]:
     """Numbers of the recordings of each batch, in the order in which they were made, or else are listed."""
     batches: dict[str, list[int]] = {}
     for i, w in enumerate(whitened):
@@ -421,12 +365,12 @@ def _slope(at: NDArray, values: NDArray) -> float:
     return float(at @ values / (at @ at))
 
 
-def report(whitened: Sequence["Whitened"]) -> list[dict]:
+def report(whitened: Sequence[Whitened]) -> list[dict]:
     """Standard deviations that count as noise, as plain data for diagnosis.json: estimated from what, or assumed."""
     return [*_spreads(whitened), *_sensors(whitened)]
 
 
-def _spreads(whitened: Sequence["Whitened"]) -> list[dict]:
+def _spreads(whitened: Sequence[Whitened]) -> list[dict]:
     applied: dict[str, tuple[float, str]] = {}
     for w in whitened:
         for name, value, sd in w.scalar_nuisances:
@@ -442,7 +386,7 @@ def _spreads(whitened: Sequence["Whitened"]) -> list[dict]:
     return found
 
 
-def _sensors(whitened: Sequence["Whitened"]) -> list[dict]:
+def _sensors(whitened: Sequence[Whitened]) -> list[dict]:
     """The noise of each channel: its root mean square over all recordings, and where most of them have it from."""
     found = []
     for channel in dict.fromkeys(c for w in whitened for c in w.observations.channels):

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ccmodel import mechanisms as registry
 from ccmodel.channels import THETA_OUT, ZERO_OF
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.repeatability import FRICTION, PRETENSION, STATED, Repeatability
+from ccmodel.diagnosis.spreads import FRICTION, FRICTION_SCALE, PRETENSION, STATED, Repeatability
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
@@ -201,7 +201,7 @@ class Whitened:
         means, found = self.own_values({}), {}
         for name, value, spread in self.scalar_nuisances:
             if name == FRICTION:
-                found["friction_scale"] = float(np.clip(means[name] / value, *settings.OWN_FRICTION))
+                found[FRICTION_SCALE] = float(np.clip(means[name] / value, *settings.OWN_FRICTION))
             elif name in CURVATURES:
                 reach = settings.OWN_CURVATURE * spread
                 found[name] = float(np.clip(means[name], -reach, reach))

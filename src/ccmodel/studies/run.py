@@ -10,8 +10,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from ccmodel import provenance
+from ccmodel.figures import save_figure, stamp_figure
 from ccmodel.progress import Progress, each_of, silent, within
-from ccmodel.report.figures import save_figure, stamp_figure
 from ccmodel.steps.files import Fitted, Pair, fitted, read_json, read_pairs, write_json, write_table
 from ccmodel.studies.loops.settings import Measuring
 

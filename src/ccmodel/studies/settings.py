@@ -1,15 +1,23 @@
 """What the settings of every study state: what it needs and which files it makes."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 from ccmodel.typed import TypedModel
 
-if TYPE_CHECKING:
-    from ccmodel.studies.accuracy.settings import Accuracy
-    from ccmodel.studies.loops.settings import Study
-
 EACH = "each"
+
+
+class FigureSettings(Protocol):
+    """What studies read of one that is drawn as a figure (`ccmodel.studies.loops.settings.Study`)."""
+
+    @property
+    def batches(self) -> list[str] | str:
+        """Batches in the figure, or `EACH`."""
+
+    @property
+    def variable(self) -> str:
+        """What varies among the recordings."""
 
 
 class Configuration(Protocol):
@@ -24,14 +32,14 @@ class Configuration(Protocol):
         """Batches of one rig, by its name."""
 
     @property
-    def studies(self) -> "Mapping[str, Study]":
+    def studies(self) -> Mapping[str, FigureSettings]:
         """The studies that are drawn as figures, by name."""
 
     def sets_of(self, batch: str) -> list[str]:
         """Parameter sets of a batch."""
 
-    def parameters_of(self, study: "Study | Accuracy", batch: str) -> str:
-        """Name of the parameter set that a study takes for a batch."""
+    def parameters_of(self, wanted: str | None, batch: str) -> str:
+        """Name of the parameter set that a study takes for a batch, if it wants this one, or any."""
 
 
 class StudySettings(TypedModel):
@@ -42,7 +50,7 @@ class StudySettings(TypedModel):
     heading: ClassVar[str]
     # CSV files in results/tables; a study with tables also has a JSON file there, which its part of the page shows.
     tables: ClassVar[tuple[str, ...]] = ()
-    # Figures in results/figures, each in every format (`ccmodel.report.figures.FORMATS`), and what they show: a plain
+    # Figures in results/figures, each in every format (`ccmodel.figures.FORMATS`), and what they show: a plain
     # sentence or two for their caption.
     figures: ClassVar[tuple[str, ...]] = ("{name}",)
     shows: ClassVar[str] = ""

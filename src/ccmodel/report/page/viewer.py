@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ccmodel.accuracy.measure import NOT_ACCEPTED
 from ccmodel.channels import CABLES, CHANNELS, MEASURED, TABLE, TENSIONS, THETA_IN, THETA_OUT
+from ccmodel.figures import TRANSMISSION
 from ccmodel.model.run import PRESCRIBED
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.embedding import compressed
-from ccmodel.report.figures import TRANSMISSION
 
 MOST_SAMPLES = 1200  # a panel is at most so many pixels wide
 LEVELS = 65534  # of a channel's range; one more stands for a missing value

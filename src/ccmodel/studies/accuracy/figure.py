@@ -9,8 +9,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ccmodel.figures import COLOURS, MARKERS, STYLE, empty_figure, legend_below, subplots, title_figure
 from ccmodel.recording import ORIGIN
-from ccmodel.report.figures import COLOURS, MARKERS, STYLE, empty_figure, legend_below, subplots, title_figure
 from ccmodel.studies.variables import batches_by_origin
 
 COLUMNS = 4

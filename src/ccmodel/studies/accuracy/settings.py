@@ -30,5 +30,5 @@ class Accuracy(StudySettings):
         self, config: Configuration, studies: Mapping[str, StudySettings], batches: Sequence[str]
     ) -> list[tuple[str, str, str]]:
         """Label, parameter set and batch of every run: one run of each batch with the set, with an empty label."""
-        named = [(config.parameters_of(self, batch), batch) for batch in batches]
+        named = [(config.parameters_of(self.parameters, batch), batch) for batch in batches]
         return [("", parameters, batch) for parameters, batch in named if parameters in config.sets_of(batch)]

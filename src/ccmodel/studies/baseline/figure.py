@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, empty_figure, legend_below, subplots, title_figure
+from ccmodel.figures import COLOURS, LINES, MARKERS, STYLE, empty_figure, legend_below, subplots, title_figure
 
 COLUMNS = 3
 # Commits that a panel has room to name.

@@ -11,8 +11,7 @@ from matplotlib.lines import Line2D
 
 from ccmodel.channels import TABLE, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.errors import last_cycle
-from ccmodel.recording import Recording
-from ccmodel.report.figures import (
+from ccmodel.figures import (
     COLOURS,
     LINES,
     MARKERS,
@@ -27,6 +26,7 @@ from ccmodel.report.figures import (
     subplots,
     title_figure,
 )
+from ccmodel.recording import Recording
 from ccmodel.studies.claims.claim import Claim, Row
 from ccmodel.studies.loops.measures import QUANTITIES
 

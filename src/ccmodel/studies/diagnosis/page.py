@@ -22,13 +22,13 @@ from ccmodel.diagnosis.location import PHASES, mismatch
 from ccmodel.diagnosis.run import Diagnosis
 from ccmodel.diagnosis.settings import CONSPICUOUS
 from ccmodel.diagnosis.verdict import nested_choice
+from ccmodel.figures import COLOURS, STYLE, legend_below, print_figure, stamp_figure, subplots, title_figure
 from ccmodel.mechanisms import catalogue
 from ccmodel.mechanisms.law_arguments import POSITION
 from ccmodel.model.parameters import batch_key
 from ccmodel.provenance import stamp
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.embedding import asset
-from ccmodel.report.figures import COLOURS, STYLE, legend_below, print_figure, stamp_figure, subplots, title_figure
 from ccmodel.report.verdict import (
     NOT_ACCEPTED,
     SYMBOL,

@@ -43,7 +43,7 @@ class Study(StudySettings):
         self, config: Configuration, studies: Mapping[str, StudySettings], batches: Sequence[str]
     ) -> list[tuple[str, str, str]]:
         """Label, parameter set and batch of every run in the figure."""
-        return [("", config.parameters_of(self, batch), batch) for batch in self.batches]
+        return [("", config.parameters_of(self.parameters, batch), batch) for batch in self.batches]
 
 
 class Measuring(TypedModel):

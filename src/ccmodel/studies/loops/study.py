@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy.ndimage import uniform_filter1d
 
+from ccmodel import figures
 from ccmodel.channels import TABLE, TAU_IN, TAU_OUT, THETA_IN
 from ccmodel.errors import error_table, is_compared, last_cycle
+from ccmodel.figures import COLOURS, LINES, name_axes
 from ccmodel.model.run import PRESCRIBED
 from ccmodel.recording import ORIGIN
-from ccmodel.report import figures
-from ccmodel.report.figures import COLOURS, LINES, name_axes
 from ccmodel.steps.files import Pair
 from ccmodel.studies.loops.settings import Measuring, Study
 from ccmodel.studies.run import Outcome, Run

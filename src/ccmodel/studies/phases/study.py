@@ -11,12 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ccmodel.channels import TABLE, TAU_IN, TAU_OUT, TENSIONS, THETA_IN
-from ccmodel.geometry import ConduitPath
-from ccmodel.model.exact import CableProfile
-from ccmodel.model.load import SpringLoad
-from ccmodel.model.phases import PAPERS_PHASES, PhaseStudy, simulate_phases
-from ccmodel.model.transmission import Transmission
-from ccmodel.report.figures import (
+from ccmodel.figures import (
     COLOURS,
     STYLE,
     TRANSMISSION,
@@ -26,6 +21,11 @@ from ccmodel.report.figures import (
     plot_channels,
     subplots,
 )
+from ccmodel.geometry import ConduitPath
+from ccmodel.model.exact import CableProfile
+from ccmodel.model.load import SpringLoad
+from ccmodel.model.phases import PAPERS_PHASES, PhaseStudy, simulate_phases
+from ccmodel.model.transmission import Transmission
 from ccmodel.studies.loops.settings import Measuring
 from ccmodel.studies.phases.settings import FIGURES, PhaseExample
 from ccmodel.studies.run import Outcome, Run

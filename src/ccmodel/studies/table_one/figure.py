@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ccmodel.channels import TABLE, TABLE_ONE
-from ccmodel.report.figures import COLOURS, STYLE, title_figure
+from ccmodel.figures import COLOURS, STYLE, title_figure
 from ccmodel.studies.table_one.rank import flat_distance, target
 from ccmodel.studies.table_one.refit import NORMS
 from ccmodel.studies.table_one.settings import TableOne

@@ -11,9 +11,9 @@ from pathlib import Path
 import pandas as pd
 
 from ccmodel import provenance
+from ccmodel.figures import FORMATS, save_figure, stamp_figure
 from ccmodel.outputs import new_file, new_files
 from ccmodel.progress import Progress, silent, within
-from ccmodel.report.figures import FORMATS, save_figure, stamp_figure
 from ccmodel.steps.files import write_json, write_table
 from ccmodel.studies.table_one.cases import Case, pair_cases, run, single_cases, usable_conditions
 from ccmodel.studies.table_one.effects import Effect, finer

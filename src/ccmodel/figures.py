@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import matplotlib
 from matplotlib.artist import Artist
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ccmodel.channels import CABLES, TABLE, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.outputs import new_file
-from ccmodel.recording import Recording
 
 # The palette of Okabe and Ito without its yellow, which is too faint on white; readable with any colour vision.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
@@ -42,6 +41,12 @@ STYLE: dict[Any, Any] = {
 }
 
 
+class Channels(Protocol):
+    """Values of a channel by its name: a recording, or a mapping."""
+
+    def __getitem__(self, channel: str, /) -> NDArray: ...
+
+
 def subplots(
     rows: int = 1, columns: int = 1, figsize: tuple[float, float] = (9, 4), **style: Any
 ) -> tuple[Figure, Any]:
@@ -50,10 +55,8 @@ def subplots(
     return figure, figure.subplots(rows, columns, **style)
 
 
-def plot_channels(
-    ax: Axes, values: Mapping[str, NDArray] | Recording, x: str, y: str, samples: slice = slice(None), **style: Any
-) -> None:
-    """Channel `y` over channel `x`, in the units of their axes; `values` gives the values of a channel by its name."""
+def plot_channels(ax: Axes, values: Channels, x: str, y: str, samples: slice = slice(None), **style: Any) -> None:
+    """Channel `y` over channel `x`, in the units of their axes."""
     ax.plot(values[x][samples] * TABLE[x].scale, values[y][samples] * TABLE[y].scale, **style)
 
 
