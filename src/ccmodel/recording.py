@@ -4,6 +4,7 @@ import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -196,12 +197,11 @@ class Recording:
 
 def plotted(recordings: Sequence[Recording], channel: str | None = None) -> "Figure":
     """Figure of the channels of a batch's recordings, or of one channel alone (`Recording.plot`)."""
-    # Here, since matplotlib takes long to import.
-    from ccmodel.session_figures import channels_over_time
-
+    # By name: no computation on recordings depends on how they are drawn, and none is repeated for a change of it.
+    figures = import_module("ccmodel.session_figures")
     first = recordings[0]
     recorded = {r.id: (r.time_s, r.channels) for r in recordings}
-    return channels_over_time(recorded, f"{first.batch}: {ORIGIN[first.origin]}", channel)
+    return figures.channels_over_time(recorded, f"{first.batch}: {ORIGIN[first.origin]}", channel)
 
 
 def stride(recording: Recording, step_s: float | None) -> int:
