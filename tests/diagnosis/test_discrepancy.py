@@ -82,7 +82,7 @@ def test_scaled_equations_are_those_of_unknowns_in_another_unit():
 def test_an_unknown_that_may_be_neutral_has_the_mean_evidence_of_a_model_with_it_and_one_without():
     random = np.random.default_rng(6)
     J, e, away = random.standard_normal((12, 3)), random.standard_normal(12), 0.4
-    prior_sd, from_mean = np.array([0.5, 2.0, 1.0]), np.array([0.7, 0.0, 0.0])
+    prior_sd, from_mean = np.array([0.5, 2.0, 1.0]), np.array([0.7, 0.2, 0.0])
     free = NormalEquations(J.T @ J, J.T @ e, float(e @ e), prior_sd, from_mean)
     at_neutral, rest = e - away * J[:, 1], J[:, [0, 2]]
     without = NormalEquations(
@@ -230,11 +230,12 @@ def test_a_fault_in_one_channel_of_three_may_be_small():
     assert all(np.isfinite(value) for value in evidence_of(alike, None, 0.0, 0.0).in_channel.values())
 
 
-def test_a_state_far_from_its_prior_costs_what_the_prior_says(recordings):
+@pytest.mark.parametrize(("name", "parameter"), [("running-in", "done"), ("constant-drag", "s")])
+def test_a_state_or_a_place_far_from_its_prior_costs_what_the_prior_says(recordings, name, parameter):
     """Two standard deviations cost 2, where the recordings determine it."""
-    whole, key = calibrated(recordings), "running-in/conduit/done"
-    done = next(p for p in registry.get("running-in").states if p.name == "done")
-    hypothesis = Hypothesis((("running-in", "conduit"),))
+    whole, key = calibrated(recordings), f"{name}/conduit/{parameter}"
+    one = registry.get(name).parameter(parameter)
+    hypothesis = Hypothesis(((name, "conduit"),))
 
     def at(value):
         jacobian = [block_diag(J, 1e4) for J in whole.jacobian]
@@ -243,7 +244,8 @@ def test_a_state_far_from_its_prior_costs_what_the_prior_says(recordings):
             whole, hypothesis=hypothesis, values=whole.values | {key: value}, jacobian=jacobian, residuals=residuals
         )
 
-    mean, away = (NormalEquations.of(at(v)).log_evidence for v in (done.start, done.start + 2 * done.spread))
+    sd = one.spread or one.prior_sd
+    mean, away = (NormalEquations.of(at(value)).log_evidence for value in (one.start, one.start + 2 * sd))
     assert mean - away == pytest.approx(2.0, rel=1e-3)
 
 

@@ -54,20 +54,23 @@ def test_every_mechanism_has_a_sentence_on_its_own_strengths(name):
     fields = set(re.findall(r"\{(\w+)(?::%)?\}", mechanism.sentence)) - {"side"}
     assert {p.name for p in mechanism.strengths} <= fields <= {p.name for p in mechanism.parameters}
     assert ("|" in mechanism.sentence) <= mechanism.strengths[0].signed
-    assert set(re.findall(r"\[(\w+): ", mechanism.sentence)) <= {p.name for p in mechanism.shapes}
+    assert set(re.findall(r"\[(\w+):", mechanism.sentence)) <= {p.name for p in mechanism.shapes}
     for place in mechanism.places:
         parameters = [
             {
                 "name": p.name,
-                "value": p.start,
-                "low": 0.9 * p.start,
-                "high": 1.1 * p.start,
+                "value": value,
+                "low": 0.9 * value,
+                "high": 1.1 * value,
                 "unit": p.unit.replace(" ", "*"),
             }
-            for p in mechanism.parameters
+            # Off the neutral value, so that every clause is said.
+            for p, value in ((p, p.at(0.6)) for p in mechanism.parameters)
         ]
         said = claim({"name": name, "place": place, "parameters": parameters})
         assert not set("{}[]|") & set(said)
+        assert " ," not in said
+        assert "  " not in said
         assert ("{side}" in mechanism.sentence) <= (place.split("-")[0] in said)
 
 

@@ -152,10 +152,10 @@ def law_of(hypothesis: Hypothesis) -> Law | None:
     return next(iter(laws_in(hypothesis)), None)
 
 
-def coefficients_of(hypothesis: Hypothesis) -> dict[str, float]:
-    """Standard deviation of the prior of each coefficient of a law in a hypothesis."""
+def prior_means(hypothesis: Hypothesis) -> dict[str, float]:
+    """Mean of the normal prior of each parameter that has one (`Parameter.prior_sd`), as a coefficient of a law."""
     return {
-        mechanism_key(name, place, p.name): p.prior_sd
+        mechanism_key(name, place, p.name): p.start
         for name, place in hypothesis.baseline + hypothesis.acting
         for p in registry.get(name).parameters
         if p.prior_sd

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
 from ccmodel.diagnosis.candidate import CandidateFit
-from ccmodel.diagnosis.hypothesis import coefficients_of
+from ccmodel.diagnosis.hypothesis import prior_means
 from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS, IN_EVIDENCE, prior_spread
 from ccmodel.mechanisms import Parameter
@@ -36,8 +36,8 @@ class NormalEquations:
         Standard deviation of the unknowns' prior.
     from_mean : ndarray, shape (unknowns,)
         Distance of the unknowns from their prior's mean over its standard deviation, where the prior has a mean of its
-        own: that of a law's coefficients, of what differs between batches, and of the states of mechanisms when a
-        recording starts; 0 elsewhere.
+        own: that of a law's coefficients and of a place, of what differs between batches, and of the states of
+        mechanisms when a recording starts; 0 elsewhere.
     from_neutral : mapping of int to float
         Distance from the neutral value of each unknown that may as well be neutral (`Parameter.optional`), by its
         number.
@@ -65,7 +65,7 @@ class NormalEquations:
             score += products[:-1, -1]
             square += float(products[-1, -1]) + w.state_log_determinant(weight)
         prior_sd = np.array([_prior_sd(candidate, name) for name in candidate.values])
-        means = dict.fromkeys(coefficients_of(candidate.hypothesis), 0.0)
+        means = prior_means(candidate.hypothesis)
         means |= {n: f.prior_mean for n, f in candidate.free.items() if f.spread}
         means |= {
             mechanism_key(name, place, state.name): state.start
@@ -91,13 +91,14 @@ class NormalEquations:
 
     def held(self, k: int, change: float) -> Self:
         """The same where one unknown changes by so much and is known."""
-        prior_sd = self.prior_sd.copy()
-        prior_sd[k] = 0.0
+        prior_sd, from_mean = self.prior_sd.copy(), self.from_mean.copy()
+        prior_sd[k] = from_mean[k] = 0.0
         return replace(
             self,
             score=self.score + self.information[:, k] * change,
             square=self.square + (2 * self.score[k] + self.information[k, k] * change) * change,
             prior_sd=prior_sd,
+            from_mean=from_mean,
         )
 
     @property

@@ -46,7 +46,7 @@ MECHANISM = Mechanism(
         r"\mathrm{local}}{L} + \mathrm{local}\;\delta(x - s L)\right)"
     ),
     sentence=(
-        "each cable drags with a constant {f0}, whatever its tension[local: , {local:%} of it at one place, at {s:%} "
+        "each cable drags with a constant {f0}, whatever its tension[local:, {local:%} of it at one place, at {s:%} "
         "of the length]"
     ),
     places=("conduit",),

@@ -227,7 +227,8 @@ class Mechanism:
     sentence : str
         What a report says where it is identified: ``{name}`` is the value of a parameter with its unit, ``{name:%}`` in
         per cent, ``{side}`` the end of the place; of ``[high|low]`` the first is for a positive strength, and
-        ``[name: clause]`` is said where the interval of that parameter excludes its neutral value.
+        ``[name: clause]``, or ``[name:, clause]``, is said where the interval of that parameter excludes its neutral
+        value.
     places : tuple of str
         Where it can act, of `PLACES`.
     parameters : tuple of Parameter

@@ -348,9 +348,9 @@ def claim(mechanism: Mapping) -> str:
 
     def clause(match: re.Match) -> str:
         p = parameters[match[1]]
-        return "" if p["low"] <= known.parameter(match[1]).neutral <= p["high"] else f" {match[2]}"
+        return "" if p["low"] <= known.parameter(match[1]).neutral <= p["high"] else match[2]
 
-    said = re.sub(r"\[(\w+): (.*?)\]", clause, known.sentence)
+    said = re.sub(r"\[(\w+):(.*?)\]", clause, known.sentence)
     said = direction.sub(lambda match: match[1] if strength >= 0 else match[2], said)
     said = re.sub(r"\{(\w+)(:%)?\}", value, said)
     return f"{said} ({'; '.join(intervals)})" if intervals else said
