@@ -374,20 +374,6 @@ def test_compliance_adds_to_the_cables_own(place, name):
     assert per_turn == pytest.approx(1 / (1 / 7750 + c), rel=1e-7)
 
 
-@pytest.mark.parametrize("place", ["drive-end", "load-end"])
-def test_a_knot_yields_by_more_until_its_tension_is_beyond_the_bedding(place):
-    """Without friction, what the drive winds in is what cable and knot yield, in closed form by the knot's own u."""
-    c, b, start = 50e-6, 2.0, 1.0
-    u = np.linspace(0, 15 * c, 4001)
-    T = u / c - b * (1 - np.exp(-u / (b * c)))
-    theta = np.linspace(0, 0.2, 40)
-    r = run(theta, ("termination-compliance", place, {"compliance": c, "bedding": b}), T=start, mu=0.0,
-            load=AngleLoad(np.zeros(40)))  # fmt: skip
-    wound_m = (r.T1_N - start) / K + np.interp(r.T1_N, T, u) - np.interp(start, T, u)
-    assert r.T1_N[-1] > 3 * b
-    assert wound_m == pytest.approx(R * theta, abs=1e-9)
-
-
 def test_a_termination_yields_at_once_and_a_conduit_with_the_mean_tension():
     """Start of a pull: the cable stretches up to the front, a termination at once, a conduit by its mean tension."""
     theta = np.linspace(0, 2e-3, 20)

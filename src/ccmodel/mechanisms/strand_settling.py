@@ -10,6 +10,8 @@ Separated by: a sweep at low pretension: settling depends on the cable's own ten
 Source: Feyrer, Wire Ropes: Tension, Endurance, Reliability, 2nd edition, Springer, 2015, on the rope modulus.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,17 +37,15 @@ def stretch_at(tension: NDArray, settled: NDArray, stiffness: NDArray) -> NDArra
     return stretch
 
 
-def over_settled(tension: NDArray, scale_N: float) -> NDArray:
-    """Compliance at tensions (N, shape (n,)) over that of what has settled, with the tension scale of the settling."""
+def _of_tension(tension: NDArray, values: Mapping[str, float]) -> NDArray:
+    """Compliance over that of a settled cable."""
     one = np.ones_like(tension)
-    stretch = stretch_at(np.maximum(tension / max(scale_N, LEAST_SCALE_N), SLACK_SHARE), one, one)
-    return -1 / np.expm1(-stretch)
+    over_settled = stretch_at(np.maximum(tension / values["T_scale"], SLACK_SHARE), one, one)
+    return -1 / np.expm1(-over_settled)
 
 
 # Below this tension over `T_scale` the compliance would grow without bound.
 SLACK_SHARE = 1e-3
-# Far below any tension: with this scale or less all is settled.
-LEAST_SCALE_N = 1e-3
 _T_SCALE = Parameter("T_scale", "N", 0.5, 10.0, 2.0, "tension scale of the settling")
 
 MECHANISM = Mechanism(
@@ -58,7 +58,5 @@ MECHANISM = Mechanism(
     mistaken_for=("backlash", "slack"),
     depends_on_time=False,
     settings={"settling_N": "T_scale"},
-    curves=(
-        Curve(CABLE_STRETCH, "tension", lambda tension, values: over_settled(tension, values["T_scale"]), (_T_SCALE,)),
-    ),
+    curves=(Curve(CABLE_STRETCH, "tension", _of_tension, (_T_SCALE,)),),
 )

@@ -336,10 +336,10 @@ def _constants(
     drag = settings.conduit_drag
     for film in (rows.VISCOUS, rows.FILM, rows.FILM_SLOPE):
         node[film][:, cells] = settings.viscous * cell
-    for end, k, bedding_N in ((drive, 0, settings.drive_end_bedding_N), (load, -1, settings.load_end_bedding_N)):
-        if end is not None:
-            piece[rows.STIFFNESS][:, k] = 1 / end[0]
-            piece[rows.LOST][:, k] = bedding_N * end[0]
+    if drive is not None:
+        piece[rows.STIFFNESS][:, 0] = 1 / drive[0]
+    if load is not None:
+        piece[rows.STIFFNESS][:, -1] = 1 / load[0]
     ends = [[end[1]] if end is not None else [] for end in (drive, load)]
     springs = [*ends[0], *[settings.cable_compliance] * segment.size, *ends[1]]
     node = _with_tables(node, [_rows(settings.friction_by_tension)] * nodes)
@@ -406,7 +406,7 @@ def _physics(
     for name, law in load_laws.items():
         first_rows[name], end = end, end + law.size
     return rows.Physics(
-        has_settling=max(settings.settling_N, settings.drive_end_bedding_N, settings.load_end_bedding_N) > 0,
+        has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
         relaxing_times_s=branch_times(settings.relaxing_time_s, settings.relaxing_spread),
         bristle=contacts.bristle_m if has_presliding else _coulomb_bristle(transmission, settings),
