@@ -91,8 +91,8 @@ class Parameter:
         Whether a rig with the mechanism may as well have it at its neutral value, which has half of the prior
         probability then.
     prior_sd : float
-        Of a coefficient of an unknown law, or of a place: standard deviation of its normal prior about the neutral
-        value. 0: any value in the range is as probable.
+        Of a coefficient of an unknown law, or of a place: standard deviation of its normal prior, whose mean is
+        `start`. 0: any value in the range is as probable.
     """
 
     name: str
