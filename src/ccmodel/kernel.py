@@ -10,7 +10,6 @@ from uuid import uuid4
 import numba
 from numba import njit, types
 from numba.core.compiler_lock import global_compiler_lock
-from numba.extending import intrinsic
 
 from ccmodel.provenance import source_digest
 
@@ -57,7 +56,7 @@ def kernel(function: Function, **options: Any) -> Function: ...
 def kernel(**options: Any) -> Callable[[Function], Function]: ...
 
 
-def kernel(function: Any = None, **options: Any) -> Any:
+def kernel(function: Any = None, *, allocates: bool = False, **options: Any) -> Any:
     """Compile `function`; cache it until its module, or a module of the package that it imports, changes.
 
     numba compares the time stamp of a kernel's own file only: a change in a file that the kernel calls would go
@@ -67,14 +66,18 @@ def kernel(function: Any = None, **options: Any) -> Any:
     ----------
     function : callable, optional
         Absent if the decorator is used with options.
+    allocates : bool
+        Whether it makes arrays or returns them. Any other kernel counts no references to arrays, which its caller keeps
+        alive: numba would count them, with atomic instructions, wherever an array or a tuple with arrays is handed on,
+        and these took a third of the time of a march.
     **options
         Options of `numba.njit`.
     """
     if function is None:
-        return partial(kernel, **options)
+        return partial(kernel, allocates=allocates, **options)
     function.__qualname__ += f"_{source_digest(function.__module__, discovered=False)}"
-    # The types of numba do not know all of its options.
-    compiled = njit(cache=True, nogil=True, no_cfunc_wrapper=True, **options)(function)  # type: ignore[call-overload]
+    options |= {"cache": True, "nogil": True, "no_cfunc_wrapper": True, "_nrt": allocates}
+    compiled = njit(**options)(function)
     if hasattr(compiled, "get_call_template"):  # absent if numba is switched off
         _ignore_literals(compiled)
     if cache := getattr(compiled, "_cache", None):
@@ -132,38 +135,6 @@ def _ignore_literals(compiled: Any) -> None:
     compiled.get_call_template = by_type
 
 
-# A kernel inlined into its callers, for code that every sample passes.
+# A kernel inlined into its callers, for code that every sample passes. The general solver's kernels with one caller
+# are inlined too, beside other options: to hand on a run's arrays and constants copies more than a hundred words.
 small_kernel = kernel(forceinline=True)
-
-
-Value = TypeVar("Value")
-# A kernel gives an intrinsic's arguments without the typing context.
-_intrinsic: Callable[[Callable[..., Any]], Callable[[Value], Value]] = intrinsic
-
-
-@_intrinsic
-def borrowed(typing_context: Any, value: Any) -> Any:
-    """`value`, an array or a tuple with arrays, without a reference to its memory; for use inside kernels.
-
-    Otherwise every kernel that receives an array increments and decrements its reference count, with atomic
-    instructions that take longer than the kernel's arithmetic. The caller of the outermost kernel keeps the arrays
-    alive.
-    """
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _without_owner(context, builder, value, arguments[0])
-
-    return value(value), generate
-
-
-def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    """LLVM value of the numba type `kind` with the owner removed from each of its arrays."""
-    if isinstance(kind, types.Array):
-        array = context.make_array(kind)(context, builder, value)
-        array.meminfo = array.meminfo.type(None)
-        return array._getvalue()
-    if isinstance(kind, types.BaseTuple):
-        kinds: Any = kind  # numba does not say that a type of tuples yields the types of their parts
-        parts = [_without_owner(context, builder, k, builder.extract_value(value, i)) for i, k in enumerate(kinds)]
-        return context.make_tuple(builder, kind, parts)
-    return value

@@ -80,7 +80,7 @@ def matched_site(
     return new, new_shift, log_mass, log_scale
 
 
-@kernel
+@kernel(allocates=True)
 def banded_cholesky(stencil: tuple[float, ...], weight: NDArray, coupling: NDArray, precision: NDArray) -> NDArray:
     """Cholesky factor of the banded precision matrix of a curve; entry [i, k] is L[i, i - k].
 
@@ -128,7 +128,7 @@ def solve(L: NDArray, x: NDArray) -> None:
     solve_transposed(L, x)
 
 
-@kernel
+@kernel(allocates=True)
 def banded_covariance(L: NDArray, stencil: tuple[float, ...]) -> NDArray:
     """Covariances of samples at most `order` apart; entry [i, k] is that of samples i and i - k.
 
@@ -146,7 +146,7 @@ def banded_covariance(L: NDArray, stencil: tuple[float, ...]) -> NDArray:
     return S
 
 
-@kernel
+@kernel(allocates=True)
 def sweep(
     stencil: tuple[float, ...],
     weight: NDArray,
@@ -207,7 +207,7 @@ def sweep(
     return mean, S[:, 0].copy(), L, difference, difference_variance, log_predictive
 
 
-@kernel
+@kernel(allocates=True)
 def fit_basis(basis: NDArray, prior: NDArray, low: NDArray, high: NDArray, sweeps: int) -> tuple[float, float, float]:
     """Bayesian linear regression on interval-censored observations.
 

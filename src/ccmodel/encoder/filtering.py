@@ -22,7 +22,7 @@ UNIFORM_VARIANCE = 1.0 / 12.0
 MEMORY_SAMPLES = 100.0
 
 
-@kernel
+@kernel(allocates=True)
 def filter_counts(steps: NDArray, counts: NDArray, intensities: NDArray, mean: NDArray, variance: NDArray) -> None:
     """Write mean and variance of the angle, counts and counts^2, at each sample.
 

@@ -10,10 +10,13 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
+from threading import local
 from typing import Any
 
 _threads: int | None = None
+# Of each thread: whether it is one of `_workers`.
+_thread = local()
 
 
 def set_threads(count: int | None) -> None:
@@ -32,20 +35,34 @@ def threads() -> int:
 def each(items: Sequence, work: Callable) -> list:
     """``work(i, item)`` for every item, also if one of them fails; results in their order.
 
+    Work that itself calls this function does its part on its own thread.
+
     Raises
     ------
     Exception
         Of the first item whose work failed.
     """
-    if threads() == 1:
+    if threads() == 1 or getattr(_thread, "is_worker", False):
         attempts = [_attempt(work, i, item) for i, item in enumerate(items)]
     else:
-        with ThreadPoolExecutor(threads()) as pool:
-            attempts = list(pool.map(partial(_attempt, work), range(len(items)), items))
+        attempts = list(_workers(threads(), os.getpid()).map(partial(_attempt, work), range(len(items)), items))
     for _, failure in attempts:
         if failure is not None:
             raise failure
     return [result for result, _ in attempts]
+
+
+@cache
+def _workers(count: int, process: int) -> ThreadPoolExecutor:
+    """Threads of a process, which stay: to start them takes as long as a short run of the model.
+
+    A forked process has none of its parent's.
+    """
+    return ThreadPoolExecutor(count, initializer=_become_worker)
+
+
+def _become_worker() -> None:
+    _thread.is_worker = True
 
 
 def _attempt(work: Callable, i: int, item: Any) -> tuple[Any, Exception | None]:

@@ -167,7 +167,7 @@ def _at(when: NDArray, time: NDArray, values: NDArray, integral: NDArray) -> NDA
     return integral[k] + since * (values[k] + since * slope / 2)
 
 
-@kernel
+@kernel(allocates=True)
 def _slowed(theta: NDArray, most: NDArray) -> NDArray:
     """The motion that follows `theta` by at most `most` (shape (n - 1,)) from sample to sample."""
     slowed = np.empty_like(theta)

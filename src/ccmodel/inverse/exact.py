@@ -23,7 +23,7 @@ from ccmodel.inverse.update import (
     gain_of,
     updated_variance,
 )
-from ccmodel.kernel import borrowed, kernel, small_kernel
+from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.cable import line_stiffness, reverse
 from ccmodel.model.exact.front import end_compliance
@@ -90,7 +90,7 @@ def _drive_torque(state: State) -> float:
     return state.value[0, rows.T_DRIVE] - state.value[1, rows.T_DRIVE]
 
 
-@kernel
+@kernel(allocates=True)
 def filtered(
     start: Start,
     saved: State,
@@ -133,7 +133,7 @@ def filtered(
         Displacement of the load's rim (m), and force of the cables on it (N).
     given : bool
     """
-    path, state, saved, before = borrowed(start.path), borrowed(start.state), borrowed(saved), borrowed(before)
+    path, state = start.path, start.state
     offset, stiffness = start.offset, start.stiffness
     misfit, variance = 0.0, 0.0
     covariance, effects = np.zeros(2), np.zeros(2)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.inverse.exact import start_of
-from ccmodel.kernel import borrowed, kernel
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.winding import Pulley, winding
 from ccmodel.model.exact import state as exact_rows
@@ -21,6 +21,7 @@ from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import set_grip
 from ccmodel.model.general.layout import Physics
 from ccmodel.model.general.march import accept, solve_with_contacts
+from ccmodel.model.general.newton import copy_means
 from ccmodel.model.general.run import ELEMENTS, prepared
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad
@@ -54,12 +55,14 @@ def _followed_exact(
     offset: float,
     stiffness: float,
     wanted: NDArray,
+    span: float,
     drive: NDArray,
 ) -> int:
-    """Write the drive rim's positions (m) for positions of the load's rim (m); returns the samples that were solved."""
-    path, state, saved, before = borrowed(path), borrowed(state), borrowed(saved), borrowed(before)
+    """Write the drive rim's positions (m) for positions of the load's rim (m); returns the samples that were solved.
+
+    `span` is the range of the wanted positions.
+    """
     settle(path, state, saved, offset, stiffness)
-    span = wanted.max() - wanted.min()
     guess = span / wanted.size
     for i in range(wanted.size):
         here = state.value[exact_rows.PAIR, exact_rows.DRIVE]
@@ -102,7 +105,8 @@ def exact(
     )
     drive = np.zeros(wanted_rad.size)
     wanted = wanted_rad * transmission.load_radius_m
-    solved = _followed_exact(start.path, state, saved, before, start.offset, start.stiffness, wanted, drive)
+    of_load = wanted, float(np.ptp(wanted))
+    solved = _followed_exact(start.path, state, saved, before, start.offset, start.stiffness, *of_load, drive)
     return drive / transmission.drive_radius_m, solved
 
 
@@ -130,14 +134,16 @@ def _followed_general(
     steps: int,
     time_s: NDArray,
     wanted: NDArray,
+    span: float,
     theta_in: NDArray,
 ) -> int:
-    """Write the drive's angles (rad) for angles of the load (rad); returns the samples that were solved."""
-    piece, node, slide, mean, load = borrowed((piece, node, slide, mean, load))
+    """Write the drive's angles (rad) for angles of the load (rad); returns the samples that were solved.
+
+    `span` is the range of the wanted angles.
+    """
     node[rows.RESTED] = 1.0
     set_grip(ph, node, slide, friction_factor[0], 0.0)
     fixed_grip = ph.stribeck_rise == 0.0 and len(friction_factor) == 1
-    span = wanted.max() - wanted.min()
     part = LARGEST_PART * span * ph.load_pulley.radius_m
     first, here = load[rows.ANGLE], 0.0
     guess = span * ph.load_pulley.radius_m / wanted.size
@@ -151,7 +157,7 @@ def _followed_general(
         if arrived:
             # The drive holds; time passes.
             slide[rows.NOW] = 0.0
-            mean[rows.MEAN_NEXT] = mean[rows.MEAN]
+            copy_means(mean, rows.MEAN_NEXT, rows.MEAN)
             solved, rotation = solve_with_contacts(
                 ph, piece, node, slide, mean, load, 0.0, 0.0, dt, ph.bristle, factor, fixed_grip
             )
@@ -166,7 +172,7 @@ def _followed_general(
             solved, rotation, error = False, 0.0, 0.0
             for iteration in range(ITERATIONS):
                 slide[rows.NOW] = 0.0
-                mean[rows.MEAN_NEXT] = mean[rows.MEAN]
+                copy_means(mean, rows.MEAN_NEXT, rows.MEAN)
                 slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = direction * move, -direction * move
                 solved, rotation = solve_with_contacts(
                     ph, piece, node, slide, mean, load, 0.0, 0.0, dt, ph.bristle, factor, fixed_grip
@@ -213,5 +219,5 @@ def general(
     straight = wanted_rad * transmission.load_radius_m / transmission.drive_radius_m
     load = SpringLoad(stiffness_Nm_per_rad)
     at_rest = prepared(transmission, load, settings, time_s, straight, initial, ELEMENTS, 1, np.zeros(1))
-    solved = _followed_general(*at_rest, time_s, wanted_rad, theta_in)
+    solved = _followed_general(*at_rest, time_s, wanted_rad, float(np.ptp(wanted_rad)), theta_in)
     return theta_in, solved

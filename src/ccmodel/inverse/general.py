@@ -21,7 +21,7 @@ from ccmodel.inverse.update import (
     gain_of,
     updated_variance,
 )
-from ccmodel.kernel import borrowed, kernel
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.pulley_friction import bearing, torque_under
 from ccmodel.mechanisms.winding import Pulley, winding
@@ -90,7 +90,7 @@ def _in_bearing(ph: Physics, piece: NDArray, of_sliding: float) -> float:
     return torque_under(pull, ph.drive_friction_Nm, ph.drive_friction_by_pull) * of_sliding
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", allocates=True)
 def filtered(
     ph: Physics,
     piece: NDArray,
@@ -126,7 +126,6 @@ def filtered(
     int
         Samples that were solved.
     """
-    piece, node, slide, mean, load = borrowed((piece, node, slide, mean, load))
     m = time_s.size
     attempts, most_attempts = 0, MOST_ATTEMPTS * m * steps
     past = np.zeros(rows.PAST_ROWS)

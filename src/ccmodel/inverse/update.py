@@ -110,7 +110,7 @@ def updated_variance(
     return after
 
 
-@kernel
+@kernel(allocates=True)
 def joint_estimate(
     trace: NDArray,
     measured: NDArray,
@@ -181,7 +181,7 @@ def joint_estimate(
     return correction, np.maximum(left, 0.0)
 
 
-@kernel
+@kernel(allocates=True)
 def variances(
     trace: NDArray,
     first_variance: float,

@@ -46,7 +46,7 @@ def _channels_of(end: str) -> tuple[str, ...]:
     return ANGLE_AT[end], TORQUE_AT[end], SUM_AT[end]
 
 
-@kernel
+@kernel(allocates=True)
 def _filtered(values: NDArray, time_s: NDArray, time_constant_s: float) -> NDArray:
     """Response of T dy/dt = x - y to x, which is linear between samples, from y = x at the first; shape (n,)."""
     y = values.copy()

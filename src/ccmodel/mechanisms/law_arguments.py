@@ -55,7 +55,7 @@ class Argument:
         return self.name in ("speed", "acceleration", "dwell", "time", "rate")
 
 
-@kernel
+@kernel(allocates=True)
 def _motion_memory(theta: NDArray, play: float) -> tuple[NDArray, NDArray]:
     """Direction of the last motion (0 before any), and the angle since its reversal; shapes (n,)."""
     direction, since = np.zeros(theta.size), np.zeros(theta.size)
@@ -74,7 +74,7 @@ def _motion_memory(theta: NDArray, play: float) -> tuple[NDArray, NDArray]:
     return direction, since
 
 
-@kernel
+@kernel(allocates=True)
 def _contact_age(time_s: NDArray, theta: NDArray, renewal: float) -> NDArray:
     """Time since the drive was a renewal length away from where it is, s; before that, since the start; shape (n,)."""
     age = np.zeros(theta.size)

@@ -414,7 +414,7 @@ def _united(x: NDArray, others: NDArray) -> NDArray:
     return knots[np.append(True, np.diff(knots) > SAME_KNOT * np.ptp(knots))]
 
 
-@kernel
+@kernel(allocates=True)
 def _slip(travel: NDArray, yields: NDArray) -> NDArray:
     """States of Maxwell-slip elements, -1 to 1, that yield after these travels, m; shape (elements, n)."""
     states = np.zeros((yields.size, travel.size))

@@ -33,13 +33,13 @@ PRESLIDING_RAD = 2e-3
 REFERENCE_PULL_N = 2 * REFERENCE_N
 
 
-@kernel(inline="always")
+@kernel(inline="always", allocates=True)
 def torque_under(pull_N: Any, friction_Nm: float, share: float) -> Any:
     """Friction torque (N m) of a bearing under the pull of both cables, a share of it in proportion to the pull."""
     return friction_Nm * (1.0 + share * (pull_N / REFERENCE_PULL_N - 1.0))
 
 
-@kernel
+@kernel(allocates=True)
 def bearing(theta: NDArray, presliding_rad: float) -> NDArray:
     """Friction over friction torque (-1 to 1) along angles (rad, shape (n,)) from an unloaded start."""
     share = np.zeros_like(theta)

@@ -40,14 +40,20 @@ class Pulley(NamedTuple):
     error_rad: NDArray
 
 
+NO_TABLES = (np.zeros(0),) * 5
+
+
 def pulley_of(
     radius_m: float, eccentricity: float, phase_rad: float, factor: Table | None, error: Table | None = None
 ) -> Pulley:
     """An eccentric pulley; `factor` is 1 + f and `error` g, none if not given."""
+    bore = float(radius_m), float(eccentricity), float(phase_rad)
+    if factor is None and error is None:
+        return Pulley(*bore, *NO_TABLES)
     x, f = _arrays(factor)
     f -= 1.0
     integral = np.concatenate([np.zeros(min(x.size, 1)), np.cumsum(np.diff(x) * (f[1:] + f[:-1]) / 2)])
-    return Pulley(float(radius_m), float(eccentricity), float(phase_rad), x, f, integral, *_arrays(error))
+    return Pulley(*bore, x, f, integral, *_arrays(error))
 
 
 def _arrays(table: Table | None) -> tuple[NDArray, NDArray]:
@@ -58,7 +64,12 @@ def _arrays(table: Table | None) -> tuple[NDArray, NDArray]:
 @kernel
 def _error(theta: float, pulley: Pulley) -> float:
     """The error g of an encoder that has one, where it reads theta."""
-    return np.interp(theta, pulley.read_rad, pulley.error_rad)
+    x, g = pulley.read_rad, pulley.error_rad
+    last = x.size - 1
+    if theta <= x[0] or theta >= x[last]:
+        return float(g[0] if theta <= x[0] else g[last])
+    k = min(int(np.searchsorted(x, theta, side="right")) - 1, last - 1)
+    return float(g[k] + (g[k + 1] - g[k]) / (x[k + 1] - x[k]) * (theta - x[k]))
 
 
 @kernel
@@ -79,7 +90,10 @@ def _added(theta: float, pulley: Pulley) -> tuple[float, float, float]:
 def winding(theta: float, pulley: Pulley) -> tuple[float, float, float]:
     """Cable travel over R (rad), from any zero; the radius over R, and the derivative of the latter by the angle."""
     e, psi = pulley.eccentricity, pulley.phase_rad
-    travel, factor, slope = theta - e * np.cos(theta + psi), 1.0 + e * np.sin(theta + psi), e * np.cos(theta + psi)
+    travel, factor, slope = theta, 1.0, 0.0
+    if e != 0.0:
+        slope = e * np.cos(theta + psi)
+        travel, factor = theta - slope, 1.0 + e * np.sin(theta + psi)
     if pulley.read_rad.size:
         travel -= _error(theta, pulley)
     if pulley.knots_rad.size:
@@ -92,7 +106,9 @@ def winding(theta: float, pulley: Pulley) -> tuple[float, float, float]:
 def winding_change(theta: float, rotation: float, pulley: Pulley) -> float:
     """Cable travel over R (rad) of a rotation from theta; by the bore without cancellation for a small one."""
     e, psi = pulley.eccentricity, pulley.phase_rad
-    change = rotation + 2.0 * e * np.sin(theta + psi + 0.5 * rotation) * np.sin(0.5 * rotation)
+    change = rotation
+    if e != 0.0:
+        change += 2.0 * e * np.sin(theta + psi + 0.5 * rotation) * np.sin(0.5 * rotation)
     if pulley.read_rad.size:
         change -= _error(theta + rotation, pulley) - _error(theta, pulley)
     if pulley.knots_rad.size:

@@ -1,7 +1,7 @@
 """Mechanisms that are in a model, with values for their parameters."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,6 +29,11 @@ class Active:
     values: Mapping[str, float]
 
 
+@dataclass(frozen=True)
+class _Checked(Active):
+    """One that `active_of` has returned: a run asks for it several times."""
+
+
 def active_of(mechanisms: Sequence[Active]) -> list[Active]:
     """Mechanisms as given to `ccmodel.model.general.simulate`, checked, with a value for every parameter.
 
@@ -42,11 +47,9 @@ def active_of(mechanisms: Sequence[Active]) -> list[Active]:
     """
     found: list[Active] = []
     for a in mechanisms:
-        known = registry.get(a.name)
-        _check(a, known)
         if any((a.name, a.place) == (other.name, other.place) for other in found):
             raise ModelError(f"{a.name} acts at {a.place} twice; a model has each mechanism once at a place")
-        found.append(replace(a, values=known.default | dict(a.values)))
+        found.append(a if isinstance(a, _Checked) else _checked(a))
     return found
 
 
@@ -59,6 +62,12 @@ def without_faults(mechanisms: Sequence[Active]) -> tuple[Active, ...]:
     """Mechanisms without those that modify the observation alone."""
     every = [(m, registry.get(m.name)) for m in mechanisms]
     return tuple(m for m, known in every if known.modifies_settings or known.modifies_observation is None)
+
+
+def _checked(a: Active) -> _Checked:
+    known = registry.get(a.name)
+    _check(a, known)
+    return _Checked(a.name, a.place, known.default | dict(a.values))
 
 
 def _check(a: Active, known: Mechanism) -> None:

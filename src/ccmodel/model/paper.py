@@ -197,8 +197,8 @@ def _move_cable(
             T_new[i] = 0.0
             u_new[i] = a + (b - a) * i / n
         return
-    T_new[:] = T
-    u_new[:] = u
+    for i in range(n + 1):
+        T_new[i], u_new[i] = T[i], u[i]
     k_drive, c_drive = drive
     k_load, c_load = n, 0.0
     moves_drive, moves_load = a != u[0], b != u[n]
@@ -330,7 +330,7 @@ def _balance(
     return upper, True
 
 
-@kernel
+@kernel(allocates=True)
 def _march(
     theta_in: NDArray,
     K_e: float,

@@ -96,9 +96,12 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     parameters = of_recording(parameters, recording)
     transmission = transmission_of(recording, parameters)
     initial = initial_tension(given, parameters, load_from)
+    theta_in = given.theta_in
     if parameters.drive_encoder_offset:
-        given = replace(given, theta_in=given.theta_in + parameters.drive_encoder_offset * given.drive_encoder_offset)
-    given = replace(given, theta_in=driven(parameters.mechanisms, recording.time_s, given.theta_in))
+        theta_in = theta_in + parameters.drive_encoder_offset * given.drive_encoder_offset
+    theta_in = driven(parameters.mechanisms, recording.time_s, theta_in)
+    if theta_in is not given.theta_in:
+        given = replace(given, theta_in=theta_in)
     given, samples = given.with_turning_points
     load, measured = _load(given, parameters, load_from)
     read = _readings(transmission, load, given, samples, initial, parameters)

@@ -54,7 +54,8 @@ def of_recording(parameters: Parameters, recording: Recording) -> Parameters:
         return parameters
     # With a value for every parameter, states that are not stated included.
     parameters = replace(parameters, mechanisms=tuple(active_of(parameters.mechanisms)))
-    parameters = parameters.with_values(known_states(recording, parameters))
+    if states := known_states(recording, parameters):
+        parameters = parameters.with_values(states)
     drifts = [m for m in parameters.mechanisms if registry.get(m.name).drift is not None]
     if not drifts:
         return parameters

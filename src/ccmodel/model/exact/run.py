@@ -4,7 +4,7 @@ from math import inf
 
 from numpy.typing import NDArray
 
-from ccmodel.kernel import borrowed, kernel, small_kernel
+from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.cable import is_slack
 from ccmodel.model.exact.front import position
@@ -52,7 +52,6 @@ def run(
     balance : ndarray, shape (2,)
         Largest force out of balance at the load, and highest tension at a cable's end, N; carried on.
     """
-    path, state, saved = borrowed(path), borrowed(state), borrowed(saved)
     for i in range(progress[0], drive[0].size):
         drive_now = drive[0][i] * drive[1]
         move = drive_now - state.value[rows.PAIR, rows.DRIVE]

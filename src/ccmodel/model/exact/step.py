@@ -190,13 +190,14 @@ def _first_to_slide_whole(path: PathTables, state: State, saved: State, directio
     fronts meet. The cable that takes the smaller displacement of the load is the first.
     """
     copy_state(state, saved)
-    travel = [0.0, 0.0]
+    first, least = 0, inf
     for c in range(2):
         sigma = state.kind[c, rows.SIGMA]
         before = state.front[2 * c + 1, rows.D]
         walk(path, state, c, 1, 1.0, 0.0, state.front[2 * c, rows.P] * path.ratio[(1 - sigma) // 2])
-        travel[c] = abs(state.front[2 * c + 1, rows.D] - before)
+        travel = abs(state.front[2 * c + 1, rows.D] - before)
+        if travel < least:
+            first, least = c, travel
     copy_state(saved, state)
-    first = 0 if travel[0] <= travel[1] else 1
     slide_whole(path, state, first, (2 * first - 1) * direction)
     return 1 - first

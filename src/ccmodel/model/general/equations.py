@@ -33,7 +33,7 @@ SLACK_N = 0.02
 LEAST_SCALE_N = 1.0
 
 
-@kernel(error_model="numpy", fastmath=rows.FAST)
+@kernel(error_model="numpy", fastmath=rows.FAST, forceinline=True)
 def _tensions(ph: Physics, piece: NDArray, slide: NDArray, mean: NDArray, follows: float) -> None:
     """Tension (N) and tangent stiffness (N/m) of each piece for the slides of this step.
 
@@ -222,7 +222,7 @@ def _set_film(ph: Physics, node: NDArray, c: int) -> None:
         slope[i] = viscous[i] * by_speed
 
 
-@kernel(error_model="numpy", fastmath=rows.FAST)
+@kernel(error_model="numpy", fastmath=rows.FAST, forceinline=True)
 def _nodes(
     ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float, last_dt: float, bristle: float
 ) -> float:
@@ -284,7 +284,7 @@ def _nodes(
     return total
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", forceinline=True)
 def _laws_of_load(
     ph: Physics, load: NDArray, theta: float, travel: float, omega: float, by_rotation: float
 ) -> tuple[float, float, float]:
@@ -316,7 +316,7 @@ def _by_motion(
     return torque, slope
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", forceinline=True)
 def speed_and_acceleration(load: NDArray, rotation: float, dt: float, rings: bool) -> tuple[float, float, float, float]:
     """Speed and acceleration of the load after a rotation, derivatives of the one by it and of the other by the speed.
 
@@ -337,7 +337,7 @@ def speed_and_acceleration(load: NDArray, rotation: float, dt: float, rings: boo
     return omega, alpha, a1 / dt, a1 / dt
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", forceinline=True)
 def _load(
     ph: Physics, piece: NDArray, load: NDArray, rotation: float, torque: float, dt: float
 ) -> tuple[float, float, float]:
@@ -377,7 +377,7 @@ def _load(
     )
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", forceinline=True)
 def imbalance(
     ph: Physics,
     piece: NDArray,
@@ -409,7 +409,7 @@ def imbalance(
     return error, max(highest, LEAST_SCALE_N), G, slope, R
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", forceinline=True)
 def _mean_tension(piece: NDArray, c: int) -> float:
     """Mean tension of a cable along its length, N."""
     total = 0.0
@@ -433,7 +433,8 @@ def set_grip(ph: Physics, node: NDArray, slide: NDArray, friction_factor: NDArra
         if ph.stribeck_rise > 0.0 and dt > 0.0:
             renew_contacts(ph, node, slide, c, dt, rows.ALPHA)
         else:
-            rested[:] = node[rows.RESTED, c]
+            for i in range(node.shape[2]):
+                rested[i] = node[rows.RESTED, c, i]
         for i in range(node.shape[2]):
             change = max(change, abs(rested[i] - before[i]))
             before[i] = rested[i]

@@ -8,7 +8,7 @@ cable B. Displacements count towards the drive end. A step solves the equations 
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.kernel import borrowed, kernel
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.drive_train import train_torque
 from ccmodel.mechanisms.presliding import MOST_ELEMENTS, dahl
 from ccmodel.mechanisms.pulley_friction import torque_under
@@ -41,7 +41,7 @@ TRAIN_ITERATIONS = 30
 ROUNDING = 1e-9
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", forceinline=True)
 def expect(slide: NDArray, mean: NDArray, past: NDArray, pull: float, step_pull: float, is_whole: bool) -> float:
     """Write the slides and mean tensions that a step is expected to have; returns the load's rotation.
 
@@ -63,7 +63,7 @@ def expect(slide: NDArray, mean: NDArray, past: NDArray, pull: float, step_pull:
     return by_last * past[rows.LAST_ROTATION] + by_before * past[rows.ROTATION_BEFORE]
 
 
-@kernel
+@kernel(forceinline=True)
 def remember(slide: NDArray, past: NDArray, rotation: float, step_pull: float, step_dt: float) -> None:
     """Keep a solved step for `expect`."""
     copy_slides(slide, rows.BEFORE, rows.LAST)
@@ -104,7 +104,7 @@ def solve_with_contacts(
     return solved, rotation
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", forceinline=True)
 def accept(
     ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, mean: NDArray, load: NDArray, rotation: float, dt: float
 ) -> None:
@@ -234,7 +234,7 @@ def _solve_with_train(
     return solved, rotation, angle
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", allocates=True)
 def march(
     ph: Physics,
     piece: NDArray,
@@ -285,7 +285,6 @@ def march(
     int
         Samples that were solved; fewer than there are after a step without a solution, or `MOST_ATTEMPTS` steps.
     """
-    piece, node, slide, mean, load = borrowed((piece, node, slide, mean, load))
     m, n = time_s.size, node.shape[2]
     attempts, most_attempts = 0, MOST_ATTEMPTS * m * steps
     past = np.zeros(rows.PAST_ROWS)

@@ -23,7 +23,7 @@ PATIENCE = 12
 SMALLEST_SHARE = 1.0 / 128
 
 
-@kernel(error_model="numpy", fastmath=rows.FAST)
+@kernel(error_model="numpy", fastmath=rows.FAST, forceinline=True)
 def solve(piece: NDArray, node: NDArray, slide: NDArray, G: float, slope: float, R: float, free: bool) -> float:
     """Newton's step of the slides into `STEP`; returns that of the load pulley's rotation.
 
@@ -125,7 +125,7 @@ def solve_with_conduits(
     return rotation
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", forceinline=True)
 def _move(ph: Physics, node: NDArray, slide: NDArray, share: float, bristle: float) -> None:
     """Add a share of Newton's step to the slides, but stop a node at the edge of sticking before it reverses.
 
@@ -151,7 +151,7 @@ def _move(ph: Physics, node: NDArray, slide: NDArray, share: float, bristle: flo
             slide[rows.NOW, c, i] = new
 
 
-@kernel
+@kernel(forceinline=True)
 def copy_slides(slide: NDArray, to: int, source: int) -> None:
     """Copy a row of slides to another; slicing takes several times as long for so few."""
     for c in range(2):
@@ -159,13 +159,13 @@ def copy_slides(slide: NDArray, to: int, source: int) -> None:
             slide[to, c, i] = slide[source, c, i]
 
 
-@kernel
+@kernel(forceinline=True)
 def copy_means(mean: NDArray, to: int, source: int) -> None:
     """Copy a row of mean tensions to another."""
     mean[to, 0], mean[to, 1] = mean[source, 0], mean[source, 1]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", forceinline=True)
 def solve_step(
     ph: Physics,
     piece: NDArray,
@@ -184,16 +184,21 @@ def solve_step(
     soft = ph.conduit_compliance > 0.0
     # With compliant conduits all nodes reverse at once, and full steps overshoot far.
     patience = 2 if soft and not ph.presliding else PATIENCE
-    share, best = 1.0, np.inf
+    share, best, tolerance = 1.0, np.inf, TOLERANCE
     step_rotation, saved_rotation = 0.0, rotation
-    for iteration in range(ITERATIONS):
+    for iteration in range(ITERATIONS + 1):
+        if iteration == ITERATIONS:
+            # A node or two may alternate between sliding and sticking; the two states then differ by next to nothing.
+            copy_slides(slide, rows.NOW, rows.SAVED)
+            copy_means(mean, rows.MEAN_NEXT, rows.MEAN_SAVED)
+            rotation, tolerance = saved_rotation, LOOSE_TOLERANCE
         error, limit, G, slope, R = imbalance(
             ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, follows
         )
-        if error <= (TOLERANCE * limit) ** 2:
+        if error <= (tolerance * limit) ** 2:
             return True, rotation
-        if not np.isfinite(error):
-            return False, rotation
+        if iteration == ITERATIONS or not np.isfinite(error):
+            break
         if iteration == patience and error > best:
             # Full steps do not converge: go back to the best point and accept only steps that reduce the error.
             copy_slides(slide, rows.NOW, rows.SAVED)
@@ -221,9 +226,4 @@ def solve_step(
         if soft:
             for c in range(2):
                 mean[rows.MEAN_NEXT, c] += share * mean[rows.MEAN_STEP, c]
-    # A node or two may alternate between sliding and sticking; the two states then differ by next to nothing.
-    copy_slides(slide, rows.NOW, rows.SAVED)
-    copy_means(mean, rows.MEAN_NEXT, rows.MEAN_SAVED)
-    rotation = saved_rotation
-    error, limit, G, slope, R = imbalance(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, follows)
-    return error <= (LOOSE_TOLERANCE * limit) ** 2, rotation
+    return False, rotation
