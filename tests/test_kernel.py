@@ -10,6 +10,7 @@ import tomllib
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 
 import ccmodel
@@ -127,3 +128,34 @@ def test_only_the_module_of_kernels_imports_numba():
         or (isinstance(node, ast.Import) and any(alias.name.partition(".")[0] == "numba" for alias in node.names))
     }
     assert importing == {"kernel.py"}
+
+
+@kernel.kernel
+def _first(values):
+    return values[0]
+
+
+@kernel.kernel(allocates=True)
+def _copy(values):
+    return values.copy()
+
+
+@kernel.kernel
+def _first_of_copy(values):
+    return values.copy()[0]
+
+
+def test_only_kernels_that_allocate_count_references():
+    values = np.arange(3.0)
+    assert _first(values) == 0.0
+    assert _copy(values).tolist() == values.tolist()
+    counts = {
+        f: any("NRT_incref" in code or "NRT_decref" in code for code in f.inspect_llvm().values())
+        for f in (_first, _copy)
+    }
+    assert counts == {_first: False, _copy: True}
+
+
+def test_a_kernel_that_does_not_say_that_it_allocates_is_refused():
+    with pytest.raises(numba.core.errors.NumbaError, match="NRT required but not enabled"):
+        _first_of_copy(np.arange(3.0))
