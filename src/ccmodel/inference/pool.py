@@ -45,11 +45,23 @@ def each(items: Sequence, work: Callable) -> list:
     if threads() == 1 or getattr(_thread, "is_worker", False):
         attempts = [_attempt(work, i, item) for i, item in enumerate(items)]
     else:
-        attempts = list(_workers(threads(), os.getpid()).map(partial(_attempt, work), range(len(items)), items))
+        attempts = _side_by_side(items, work)
     for _, failure in attempts:
         if failure is not None:
             raise failure
     return [result for result, _ in attempts]
+
+
+def _side_by_side(items: Sequence, work: Callable) -> list[tuple[Any, Exception | None]]:
+    """Attempts at all items; if this is broken off, as by Ctrl-C, those that have not begun are cancelled."""
+    workers = _workers(threads(), os.getpid())
+    try:
+        return list(workers.map(partial(_attempt, work), range(len(items)), items))
+    except BaseException:
+        # A thread that was being started is unknown to its pool, but ends with it.
+        workers.shutdown(wait=False, cancel_futures=True)
+        _workers.cache_clear()
+        raise
 
 
 @cache
