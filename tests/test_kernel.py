@@ -149,6 +149,9 @@ def test_only_kernels_that_allocate_count_references():
     values = np.arange(3.0)
     assert _first(values) == 0.0
     assert _copy(values).tolist() == values.tolist()
+    for compiled in (_first, _copy):
+        compiled.recompile()  # what comes from the cache has no code to look at
+    assert all(code for f in (_first, _copy) for code in f.inspect_llvm().values())
     counts = {
         f: any("NRT_incref" in code or "NRT_decref" in code for code in f.inspect_llvm().values())
         for f in (_first, _copy)

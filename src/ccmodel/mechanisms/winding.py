@@ -62,13 +62,19 @@ def _arrays(table: Table | None) -> tuple[NDArray, NDArray]:
 
 
 @kernel
+def _interval(theta: float, x: NDArray) -> int:
+    """Number of the interval between knots that an angle from the first of them on is in."""
+    return min(int(np.searchsorted(x, theta, side="right")) - 1, x.size - 2)
+
+
+@kernel
 def _error(theta: float, pulley: Pulley) -> float:
     """The error g of an encoder that has one, where it reads theta."""
     x, g = pulley.read_rad, pulley.error_rad
     last = x.size - 1
     if theta <= x[0] or theta >= x[last]:
         return float(g[0] if theta <= x[0] else g[last])
-    k = min(int(np.searchsorted(x, theta, side="right")) - 1, last - 1)
+    k = _interval(theta, x)
     return float(g[k] + (g[k + 1] - g[k]) / (x[k + 1] - x[k]) * (theta - x[k]))
 
 
@@ -81,7 +87,7 @@ def _added(theta: float, pulley: Pulley) -> tuple[float, float, float]:
     last = x.size - 1
     if theta >= x[last]:
         return integral[last] + f[last] * (theta - x[last]), f[last], 0.0
-    k = min(int(np.searchsorted(x, theta, side="right")) - 1, last - 1)
+    k = _interval(theta, x)
     slope, beyond = (f[k + 1] - f[k]) / (x[k + 1] - x[k]), theta - x[k]
     return integral[k] + (f[k] + 0.5 * slope * beyond) * beyond, f[k] + slope * beyond, slope
 

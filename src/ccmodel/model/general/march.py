@@ -8,7 +8,7 @@ cable B. Displacements count towards the drive end. A step solves the equations 
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.kernel import kernel
+from ccmodel.kernel import kernel, small_kernel
 from ccmodel.mechanisms.drive_train import train_torque
 from ccmodel.mechanisms.presliding import MOST_ELEMENTS, dahl
 from ccmodel.mechanisms.pulley_friction import torque_under
@@ -63,7 +63,7 @@ def expect(slide: NDArray, mean: NDArray, past: NDArray, pull: float, step_pull:
     return by_last * past[rows.LAST_ROTATION] + by_before * past[rows.ROTATION_BEFORE]
 
 
-@kernel(forceinline=True)
+@small_kernel
 def remember(slide: NDArray, past: NDArray, rotation: float, step_pull: float, step_dt: float) -> None:
     """Keep a solved step for `expect`."""
     copy_slides(slide, rows.BEFORE, rows.LAST)

@@ -7,7 +7,7 @@ from both drive ends at once. A compliant conduit adds the mean tension of its c
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.kernel import kernel
+from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import imbalance, set_memory
 from ccmodel.model.general.layout import Physics
@@ -151,7 +151,7 @@ def _move(ph: Physics, node: NDArray, slide: NDArray, share: float, bristle: flo
             slide[rows.NOW, c, i] = new
 
 
-@kernel(forceinline=True)
+@small_kernel
 def copy_slides(slide: NDArray, to: int, source: int) -> None:
     """Copy a row of slides to another; slicing takes several times as long for so few."""
     for c in range(2):
@@ -159,7 +159,7 @@ def copy_slides(slide: NDArray, to: int, source: int) -> None:
             slide[to, c, i] = slide[source, c, i]
 
 
-@kernel(forceinline=True)
+@small_kernel
 def copy_means(mean: NDArray, to: int, source: int) -> None:
     """Copy a row of mean tensions to another."""
     mean[to, 0], mean[to, 1] = mean[source, 0], mean[source, 1]
